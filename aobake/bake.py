@@ -1,0 +1,271 @@
+"""A bake: scene and settings in, ambient occlusion with its error out. Touches no file."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aobake.errors import InputError
+from aobake.meshes.normals import unit_rows
+from aobake.meshes.scene import Instance, Scene
+from aobake.meshes.surface import Findings, Surface, surface_of
+from aobake.plan import plan
+from aobake.points import SurfacePoints
+from aobake.results import BakedVertices, Estimate
+from aobake.settings import BakeSettings
+from aobake.tracing.backfaces import pass_through_backfaces
+from aobake.tracing.estimate import Estimates, Request, estimate
+from aobake.tracing.origins import DOUBTFUL, ENCLOSED
+from aobake.tracing.world import Placement, Triangles, World, build_world
+
+__all__ = ["bake_vertices", "visibility"]
+
+FloatArray = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A scene made ready: a surface per mesh, where instances stand, the built world, the lowest point."""
+
+    surfaces: Sequence[Surface]
+    placed: Sequence[tuple[Instance, Surface] | None]
+    world: World
+    lowest: FloatArray
+
+
+def bake_vertices(
+    scene: Scene, settings: BakeSettings | None = None, *, progress: Progress | None = None
+) -> BakedVertices:
+    """Ambient occlusion at every vertex of every instance; all of them occlude each other.
+
+    progress : called in the calling thread with (stage, done, total) while points are traced; whatever
+        it raises stops the bake within a fraction of a second, as does a KeyboardInterrupt
+    Vertices that no face uses, that are not finite or that have no normal come out as 1, with a warning
+    where a face uses them. A scene without triangles gives arrays of 1; one without vertices, empty ones.
+    Raises EngineError where Embree cannot be used.
+    """
+    settings = settings or BakeSettings()
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "prepare"):
+        decided = plan(scene, settings)
+        surfaces = [surface_of(mesh) for mesh in scene.meshes]
+    with _timed(seconds, "build"):
+        prepared = _build(scene, surfaces, settings)
+        points = _vertex_points(scene, prepared)
+    with _timed(seconds, "trace"):
+        found = _estimate(prepared, points, settings, progress)
+    ao, error = _per_instance(scene, prepared, found)
+    return BakedVertices(
+        scene=scene,
+        settings=settings,
+        plan=decided,
+        ao=ao,
+        standard_error=error,
+        rays=int(found.rays.sum(dtype=np.int64)),
+        seconds=seconds,
+        warnings=(*scene.warnings, *_warnings(scene, prepared, found)),
+    )
+
+
+def visibility(
+    scene: Scene,
+    positions: ArrayLike,
+    normals: ArrayLike,
+    settings: BakeSettings | None = None,
+    geometric_normals: ArrayLike | None = None,
+) -> Estimate:
+    """Ambient occlusion at any points of, or near, a scene's surfaces.
+
+    positions : (P, 3) float, in the scene's space
+    normals : (P, 3) float, of any length: the hemisphere that the integral is taken over
+    geometric_normals : (P, 3) float: directions below these surfaces are left out, and the rest stands
+        for the whole, so that a coarse mesh that is shaded smoothly does not occlude itself; or None
+    Returns means in [0, 1], their standard errors, and the rays spent; empty arrays for no points. A
+    point or normal that is not finite, or a normal of length 0, gives 1 with 0 rays.
+    Raises InputError for arrays of other shapes, EngineError where Embree cannot be used.
+    """
+    settings = settings or BakeSettings()
+    at = _rows("positions", positions)
+    around = _matching("normals", normals, at)
+    above = None if geometric_normals is None else _matching("geometric_normals", geometric_normals, at)
+    usable = np.isfinite(at).all(axis=1) & around.any(axis=1)
+    if above is not None:
+        usable &= above.any(axis=1)
+    chosen = np.flatnonzero(usable)
+    points = SurfacePoints(
+        positions=at[chosen],
+        normals=around[chosen],
+        geometric=None if above is None else above[chosen],
+        numbers=chosen,
+    )
+    prepared = _build(scene, [surface_of(mesh) for mesh in scene.meshes], settings)
+    found = _estimate(prepared, points, settings, None)
+    mean, error = np.ones(len(at), np.float32), np.zeros(len(at), np.float32)
+    rays = np.zeros(len(at), np.int32)
+    mean[chosen], error[chosen], rays[chosen] = found.mean, found.standard_error, found.rays
+    return Estimate(mean=mean, standard_error=error, rays=rays)
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - start
+
+
+def _build(scene: Scene, surfaces: Sequence[Surface], settings: BakeSettings) -> Prepared:
+    """Put every instance into one world. Mirrored instances get faces of their own, wound back."""
+    parts: dict[tuple[int, bool], int] = {}
+    triangles: list[Triangles] = []
+    placements: list[Placement] = []
+    placed: list[tuple[Instance, Surface] | None] = []
+    lowest = np.full(3, np.inf)
+    for instance, mesh in scene.placed():
+        transform, surface = instance.transform[:3], surfaces[instance.mesh]
+        if not np.isfinite(transform).all():
+            placed.append(None)
+            continue
+        placed.append((instance, surface))
+        mirrored = bool(np.linalg.det(transform[:, :3]) < 0.0)
+        key = (instance.mesh, mirrored)
+        if key not in parts:
+            parts[key] = len(triangles)
+            faces = surface.faces[:, [0, 2, 1]] if mirrored else surface.faces
+            triangles.append(Triangles(mesh.vertices, faces, _hit_filter(scene, mesh.material, settings)))
+        if len(surface.faces):
+            placements.append(Placement(parts[key], transform))
+            used = mesh.vertices[np.unique(surface.faces)]
+            lowest = np.minimum(lowest, (used @ transform[:, :3].T + transform[:, 3]).min(axis=0))
+    return Prepared(surfaces, placed, build_world(triangles, placements), lowest)
+
+
+def _hit_filter(scene: Scene, material: int | None, settings: BakeSettings) -> int:
+    double_sided = material is not None and scene.materials[material].double_sided
+    return pass_through_backfaces() if settings.backfaces == "ignore" and not double_sided else 0
+
+
+def _vertex_points(scene: Scene, prepared: Prepared) -> SurfacePoints:
+    """The vertices to trace from, instance by instance; numbered as they stand in the whole scene."""
+    positions, normals, numbers = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, np.int64)]
+    first = 0
+    for (instance, mesh), stands in zip(scene.placed(), prepared.placed, strict=True):
+        if stands is not None:
+            asked = np.flatnonzero(_asked(instance, stands[1]))
+            linear, shift = instance.transform[:3, :3], instance.transform[:3, 3]
+            positions.append(mesh.vertices[asked] @ linear.T + shift)
+            normals.append(_turned_normals(stands[1].normals[asked], linear))
+            numbers.append(asked + first)
+        first += len(mesh.vertices)
+    return SurfacePoints(
+        positions=np.concatenate(positions),
+        normals=np.concatenate(normals),
+        geometric=None,
+        numbers=np.concatenate(numbers),
+    )
+
+
+def _asked(instance: Instance, surface: Surface) -> NDArray[np.bool_]:
+    """(V,) the vertices to trace from; none where the transform leaves their normals no direction."""
+    turned = _turned_normals(surface.normals, instance.transform[:3, :3])
+    return surface.asked & turned.any(axis=1)
+
+
+def _turned_normals(normals: FloatArray, linear: FloatArray) -> FloatArray:
+    """(N, 3) unit normals after a linear map: by its cofactors, which a flattening one has as well."""
+    if np.array_equal(linear, np.eye(3)):
+        return normals
+    size = float(np.abs(linear).max()) or 1.0
+    a, b, c = (linear / size).T
+    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    sign = -1.0 if np.linalg.det(linear / size) < 0.0 else 1.0
+    return unit_rows(sign * normals @ cofactors.T)
+
+
+def _estimate(
+    prepared: Prepared, points: SurfacePoints, settings: BakeSettings, progress: Progress | None
+) -> Estimates:
+    ground = None
+    if settings.ground is not None:
+        lowest = float(prepared.lowest["xyz".index(settings.ground[1])])
+        ground = lowest if np.isfinite(lowest) else None
+    request = Request(
+        positions=points.positions,
+        normals=points.normals,
+        geometric=points.geometric,
+        numbers=points.numbers,
+        ground=ground,
+    )
+    report = None if progress is None else lambda done, total: progress("trace", done, total)
+    return estimate(prepared.world, request, settings, report)
+
+
+def _per_instance(
+    scene: Scene, prepared: Prepared, found: Estimates
+) -> tuple[list[NDArray[np.float32]], list[NDArray[np.float32]]]:
+    """Values and errors, one array per instance; vertices that share a place and a normal share them."""
+    means, errors = [], []
+    first = 0
+    for (instance, mesh), stands in zip(scene.placed(), prepared.placed, strict=True):
+        mean, error = np.ones(len(mesh.vertices), np.float32), np.zeros(len(mesh.vertices), np.float32)
+        if stands is not None:
+            asked = np.flatnonzero(_asked(instance, stands[1]))
+            mean[asked] = found.mean[first : first + len(asked)]
+            error[asked] = found.standard_error[first : first + len(asked)]
+            mean, error = mean[stands[1].same_as], error[stands[1].same_as]
+            first += len(asked)
+        means.append(mean)
+        errors.append(error)
+    return means, errors
+
+
+def _warnings(scene: Scene, prepared: Prepared, found: Estimates) -> list[str]:
+    """What was passed over, mended or doubtful, one line per mesh and finding."""
+    sentences = {
+        "non_finite_vertices": "vertices are not finite and were passed over",
+        "non_finite_faces": "faces have a vertex that is not finite and were passed over",
+        "degenerate_faces": "faces use a vertex twice and were passed over",
+        "reoriented_faces": "faces were wound against their neighbours and were turned for the bake",
+        "replaced_normals": "normals are zero or not finite and were computed from the faces",
+        "undefined_normals": "vertices have no normal that could be told and were left open (1)",
+    }
+    lines = []
+    for mesh, surface in zip(scene.meshes, prepared.surfaces, strict=True):
+        for field in fields(Findings):
+            number = getattr(surface.findings, field.name)
+            if number:
+                lines.append(f"mesh {mesh.name!r}: {number} {sentences[field.name]}.")
+    for instance, stands in zip(scene.instances, prepared.placed, strict=True):
+        if stands is None:
+            lines.append(f"instance {instance.name!r}: its transform is not finite; it was passed over.")
+    enclosed = int((found.states == ENCLOSED).sum())
+    if enclosed:
+        lines.append(f"{enclosed} points lie face to face on another surface and came out as 0.")
+    doubtful = int((found.states == DOUBTFUL).sum())
+    if doubtful:
+        lines.append(f"{doubtful} points have no side in front of all that touches them; they are doubtful.")
+    return lines
+
+
+def _rows(name: str, values: ArrayLike) -> FloatArray:
+    try:
+        array = np.ascontiguousarray(values, np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} are no array of numbers ({error}).") from error
+    if array.size == 0:
+        return np.zeros((0, 3))
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f"{name} have the shape {array.shape}; (P, 3) is needed.")
+    return array
+
+
+def _matching(name: str, values: ArrayLike, positions: FloatArray) -> FloatArray:
+    vectors = _rows(name, values)
+    if len(vectors) != len(positions):
+        raise InputError(f"there are {len(vectors)} {name} for {len(positions)} positions; one each is needed.")
+    return unit_rows(vectors)

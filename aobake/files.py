@@ -1,0 +1,112 @@
+"""Files in, whole; files out, whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from aobake.errors import InputError, OutputError
+
+__all__ = ["Content", "check_writable", "read_bytes", "same_file", "sha256", "write_files"]
+
+Content = bytes | bytearray | memoryview | Sequence[bytes | bytearray | memoryview]
+
+
+def read_bytes(path: Path, needed_by: str | None = None) -> bytes:
+    """The bytes of a file; raises InputError, in one line, where it cannot be had.
+
+    needed_by : the asset that refers to it, named first in the message.
+    """
+    who = f"{needed_by}: {path.name}" if needed_by else str(path)
+    try:
+        if not path.is_file():
+            if not path.exists():
+                raise InputError(f"{who}: there is no such file. Check the path.")
+            raise InputError(f"{who}: this is not a regular file. Give the file itself.")
+        return path.read_bytes()
+    except InputError:  # a ValueError itself
+        raise
+    except OSError as error:
+        raise InputError(f"{who}: it cannot be read ({error.strerror or error}).") from error
+    except ValueError as error:  # a NUL byte in the path
+        raise InputError(f"{who!r}: this is not a file name ({error}).") from error
+    except MemoryError as error:
+        raise InputError(f"{who}: it does not fit into memory.") from error
+
+
+def sha256(path: Path) -> str:
+    """Hexadecimal digest of a file's content, read in pieces."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def same_file(a: Path, b: Path) -> bool:
+    """Whether two paths name one file, through links and spelling; False where either is missing."""
+    try:
+        return a.samefile(b)
+    except OSError:
+        return False
+
+
+def check_writable(path: Path) -> None:
+    """Raise OutputError now where write_files(path) would fail for its folder: before a long bake, not after."""
+    folder = path.parent
+    if path.is_dir():
+        raise OutputError(f"{path}: this is a folder. Give the name of the file to write.")
+    if not folder.is_dir():
+        raise OutputError(f"{path}: there is no folder {folder}. Make it, or write somewhere else.")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputError(f"{path}: nothing can be written into the folder {folder}. Change its permissions.")
+
+
+def write_files(files: Mapping[Path, Content]) -> None:
+    """Write several files so that each appears whole, the last one of the mapping last.
+
+    All are written beside their targets under other names first and are moved into place only when
+    every one of them is complete: whatever fails, no target is half-written and no stray file stays.
+    Existing targets are replaced. Raises OutputError.
+    """
+    staged: list[tuple[str, Path]] = []
+    try:
+        for target, content in files.items():
+            check_writable(target)
+            staged.append((_stage(target, content), target))
+        for temporary, target in staged:
+            os.replace(temporary, target)
+    except OSError as error:
+        name = error.filename2 or target
+        raise OutputError(f"{name}: it cannot be written ({error.strerror or error}).") from error
+    finally:
+        for temporary, _ in staged:
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(temporary)
+
+
+def _stage(target: Path, content: Content) -> str:
+    pieces = [content] if isinstance(content, bytes | bytearray | memoryview) else content
+    handle, name = tempfile.mkstemp(prefix=".aobake-", suffix=".part", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            for piece in pieces:
+                stream.write(piece)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(name, _mode(target))
+    except BaseException:
+        os.unlink(name)
+        raise
+    return name
+
+
+def _mode(target: Path) -> int:
+    """Permissions of the file that is replaced, or those of any new file."""
+    try:
+        return target.stat().st_mode & 0o777
+    except OSError:
+        mask = os.umask(0)
+        os.umask(mask)
+        return 0o666 & ~mask

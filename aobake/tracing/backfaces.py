@@ -1,0 +1,34 @@
+"""Hits from behind that do not count: decided by Embree's own traversal, on just the meshes that ask."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from numba import carray, types
+
+from aobake.tracing.compiled import callback
+from aobake.tracing.contacts import pointer_to
+
+__all__ = ["pass_through_backfaces"]
+
+
+def _reject(arguments):  # type: ignore[no-untyped-def]
+    """RTCFilterFunctionN: make hits invalid whose ray runs along the triangle's normal."""
+    fields = carray(arguments, 6, np.int64)
+    count = np.int64(carray(arguments, 12, np.int32)[10])
+    valid = carray(pointer_to(fields[0]), count, np.int32)
+    ray = carray(pointer_to(fields[3]), 12 * count, np.float32)
+    hit = carray(pointer_to(fields[4]), 3 * count, np.float32)
+    for k in range(count):
+        along = 0.0
+        for i in range(3):
+            along += ray[(4 + i) * count + k] * hit[i * count + k]
+        if valid[k] == -1 and along > 0.0:
+            valid[k] = 0
+
+
+@functools.cache
+def pass_through_backfaces() -> int:
+    """Address of the filter function, compiled when it is first needed."""
+    return callback(types.void(types.voidptr), _reject)

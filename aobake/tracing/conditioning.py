@@ -1,0 +1,253 @@
+"""Coordinates that float32 can hold: recentred, scaled to unit size, long edges split where they must be.
+
+All of it happens in float64, before anything is rounded. What is left of the rounding is then a few
+ulps of the distance from the middle of what is looked at, whatever the scene's own units and place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aobake.tracing.compiled import kernel
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
+__all__ = ["UnitFrame", "shortest_edges", "split_long_edges", "unit_frame"]
+
+FloatArray = NDArray[np.float64]
+FaceArray = NDArray[np.uint32]
+
+MOST_SAMPLED = 1 << 16  # vertices of one part that the middle is taken from
+FINEST = 8192.0  # an edge may be this many times as long as the detail beside it: AO errs by 1e-4
+NEAR = 3.0  # or this many times as long as its distance from detail: an equilateral triangle's is 0.29
+COARSER = 8.0  # ratio between the sizes of detail that are told apart
+RESOLVED = 2.0**-16  # detail finer than this share of its coordinate is lost in float32 all the same
+SHORTER = 0.9  # of the length that can stay whole, so that what was cut is not cut again
+NEEDLE = 0.2  # shortest against longest edge
+ROUNDS = 64  # halvings; 2^64 is more than float64 can tell apart
+SPARE_FACES = 200_000  # what splitting may add to twice the faces that were there
+
+
+@dataclass(frozen=True, eq=False)
+class UnitFrame:
+    """x -> (x - center) * scale brings a scene into [-1, 1]; scale is a power of two, so that it is exact."""
+
+    center: FloatArray
+    scale: float
+
+    def apply(self, points: FloatArray) -> FloatArray:
+        """(N, 3) float64 points in units of the frame."""
+        return (points - self.center) * self.scale
+
+
+def unit_frame(parts: Sequence[FloatArray]) -> UnitFrame:
+    """The frame of several (N, 3) clouds of finite points; the identity for none.
+
+    The centre is the median of the points, not the middle of their bounding box: float32 is densest
+    around it, and that is where the detail should be. A ground as wide as a city hardly moves it.
+    """
+    filled = [part for part in parts if len(part)]
+    if not filled:
+        return UnitFrame(np.zeros(3), 1.0)
+    sampled = [part[:: max(1, len(part) // MOST_SAMPLED)] for part in filled]
+    center = np.median(np.concatenate(sampled), axis=0)
+    reach = max(
+        max(float(np.abs(part.max(axis=0) - center).max()), float(np.abs(part.min(axis=0) - center).max()))
+        for part in filled
+    )
+    if not (reach > 0.0 and math.isfinite(reach)):
+        return UnitFrame(center, 1.0)
+    exponent = math.frexp(reach)[1]
+    return UnitFrame(center, math.ldexp(1.0, max(-1000, min(1000, -exponent))))
+
+
+def shortest_edges(vertices: FloatArray, faces: FaceArray) -> FloatArray:
+    """(V,) float64, the shortest edge of any face at each vertex; infinite where there is none.
+
+    Edges of length 0 are passed over: they have no size that anything could be fine against.
+    """
+    shortest = np.full(len(vertices), np.inf)
+    shorten(vertices, faces, shortest)
+    return shortest
+
+
+@kernel
+def shorten(vertices, faces, shortest):  # type: ignore[no-untyped-def]
+    """Lower shortest (V,) to the length of the shortest edge at each vertex."""
+    for f in range(len(faces)):
+        for k in range(3):
+            i, j = faces[f, k], faces[f, (k + 1) % 3]
+            x = vertices[i, 0] - vertices[j, 0]
+            y = vertices[i, 1] - vertices[j, 1]
+            z = vertices[i, 2] - vertices[j, 2]
+            length = np.sqrt(x * x + y * y + z * z)
+            if length > 0.0:
+                shortest[i] = min(shortest[i], length)
+                shortest[j] = min(shortest[j], length)
+
+
+def split_long_edges(
+    vertices: FloatArray, faces: FaceArray, details: Sequence[FloatArray], sizes: Sequence[FloatArray]
+) -> tuple[FloatArray, FaceArray]:
+    """Split the triangles that are too large for the detail beside them, in float64.
+
+    The test of a ray against a triangle errs by a few ulps of the triangle's size, so a ground of
+    10,000 units blurs what stands on it by a thousandth. An edge is cut while it is longer than
+    FINEST times the size of the detail next to it and NEAR times its distance from there. Both
+    triangles of an edge cut it at the same point, so that no crack opens.
+
+    vertices, faces : (V, 3) float64, (F, 3) uint32
+    details, sizes : arrays (D, 3) and (D,) float64: points that will be asked for, and the length of
+        the shortest edge at each of them
+    Returns the vertices with the new ones behind them, and the faces; the same arrays if nothing is
+    too large. At most 2 F + SPARE_FACES faces come of it.
+    """
+    if len(faces) == 0 or not any(map(len, sizes)):
+        return vertices, faces
+    longest = _longest_edges(vertices, faces)
+    finest = min(float(size.min()) for size in sizes if len(size))
+    if not float(longest.max()) > FINEST * finest:
+        return vertices, faces
+    point, size = np.concatenate(details), np.concatenate(sizes)
+    size = np.maximum(size, RESOLVED * np.abs(point).max(axis=1))
+    finest = float(size.min())
+    large = longest > FINEST * finest
+    if not large.any():
+        return vertices, faces
+    levels = _levels_of_detail(point, size, float(longest.max()))
+    settled, active = [faces[~large]], faces[large]
+    most = 2 * len(faces) + SPARE_FACES
+    for _ in range(ROUNDS):
+        edges, of_face = _unique_edges(active)
+        where = _cuts(vertices[edges[:, 0]], vertices[edges[:, 1]], levels)
+        if not where.any() or len(active) + sum(map(len, settled)) > most:
+            break
+        _cut_needles_evenly(vertices, edges, of_face, where)
+        cut_edges = where > 0.0
+        added = np.full(len(edges), -1, np.int64)
+        added[cut_edges] = len(vertices) + np.arange(int(cut_edges.sum()))
+        a, b, t = vertices[edges[cut_edges, 0]], vertices[edges[cut_edges, 1]], where[cut_edges, None]
+        vertices = np.concatenate([vertices, (1.0 - t) * a + t * b])
+        cut = added[of_face]
+        whole = (cut < 0).all(axis=1)
+        settled.append(active[whole])
+        active = _divide(vertices, active[~whole], cut[~whole])
+    return vertices, np.concatenate([*settled, active]).astype(np.uint32)
+
+
+def _longest_edges(vertices: FloatArray, faces: FaceArray) -> FloatArray:
+    """(F,) length of the longest edge of each face."""
+    longest = np.zeros(len(faces))
+    for k in range(3):
+        side = vertices[faces[:, (k + 1) % 3]] - vertices[faces[:, k]]
+        np.maximum(longest, np.einsum("ij,ij->i", side, side), out=longest)
+    return np.sqrt(longest, out=longest)
+
+
+def _levels_of_detail(
+    details: FloatArray, sizes: FloatArray, longest: float
+) -> list[tuple[float, cKDTree]]:
+    """(size, the points whose detail is at most that size), from coarse to fine."""
+    from scipy.spatial import cKDTree
+
+    levels = []
+    size = longest / FINEST
+    while (chosen := sizes <= size).any():
+        levels.append((size, cKDTree(details[chosen])))
+        size /= COARSER
+    return levels
+
+
+def _cuts(a: FloatArray, b: FloatArray, levels: list[tuple[float, cKDTree]]) -> FloatArray:
+    """(E,) where to cut the edges from a to b, as a share of their length; 0: they can stay as they are.
+
+    An edge that is close to detail with one end loses as much there as can stay whole, so that a few
+    cuts in growing steps do; any other is halved.
+    """
+    length = np.linalg.norm(b - a, axis=1)
+    where = np.zeros(len(a))
+    for size, tree in levels:
+        long = np.flatnonzero((where == 0.0) & (length > FINEST * size))
+        if len(long) == 0:
+            continue
+        # Five points along the edge find whatever lies beside it to an eighth of its length.
+        along = np.linspace(0.0, 1.0, 5)[:, None, None]
+        samples = (1.0 - along) * a[long] + along * b[long]
+        distance = tree.query(samples)[0]
+        allowed = FINEST * size + NEAR * distance.min(axis=0)
+        kept = SHORTER * (FINEST * size + NEAR * distance[[0, -1]]) / length[long]
+        share = np.where(kept[0] < 0.5, kept[0], np.where(kept[1] < 0.5, 1.0 - kept[1], 0.5))
+        where[long] = np.where(length[long] > allowed, share, 0.0)
+    return where
+
+
+def _unique_edges(faces: FaceArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The (E, 2) edges of faces, and (F, 3) which of them a face's sides 0-1, 1-2, 2-0 are."""
+    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).astype(np.int64).reshape(-1, 2)
+    sides.sort(axis=1)
+    edges, of_side = np.unique(sides, axis=0, return_inverse=True)
+    return edges, of_side.reshape(-1, 3)
+
+
+def _cut_needles_evenly(
+    vertices: FloatArray, edges: NDArray[np.int64], of_face: NDArray[np.int64], where: FloatArray
+) -> None:
+    """Cut the second long edge of each needle that has one cut, as near to their common corner.
+
+    A needle with one long edge cut falls into a needle and a sliver with an angle near 180 degrees,
+    whose plane float32 cannot tell.
+    """
+    length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)[of_face]
+    longest = length.max(axis=1)
+    long = length > 0.5 * longest[:, None]
+    needles = np.flatnonzero((length.min(axis=1) < NEEDLE * longest) & (long.sum(axis=1) == 2))
+    pairs = of_face[needles][long[needles]].reshape(-1, 2)
+    # Both edges of a pair start or end at the same corner, but may be stored from it or towards it.
+    same_way = (edges[pairs[:, 0], 0] == edges[pairs[:, 1], 0]) | (
+        edges[pairs[:, 0], 1] == edges[pairs[:, 1], 1]
+    )
+    while True:
+        one, other = where[pairs[:, 0]], where[pairs[:, 1]]
+        lacking = np.flatnonzero((one > 0.0) != (other > 0.0))
+        if len(lacking) == 0:
+            return
+        share = np.maximum(one, other)[lacking]
+        share = np.where(same_way[lacking], share, 1.0 - share)
+        where[np.where(one > 0.0, pairs[:, 1], pairs[:, 0])[lacking]] = share
+
+
+def _divide(vertices: FloatArray, faces: FaceArray, cut: NDArray[np.int64]) -> FaceArray:
+    """Faces with their sides cut at the given vertices (-1: not cut) as two, three or four smaller ones."""
+    parts = []
+    count = (cut >= 0).sum(axis=1)
+    for k in range(3):
+        turned = np.roll(np.arange(3), -k)
+        a, b, c = faces[:, turned].T
+        ab, bc, ca = cut[:, turned].T
+        one = (count == 1) & (ab >= 0)
+        parts += [_stack(one, ab, b, c), _stack(one, a, ab, c)]
+        two = (count == 2) & (ca < 0)
+        across = np.linalg.norm(vertices[a] - vertices[bc], axis=1)
+        back = np.linalg.norm(vertices[c] - vertices[ab], axis=1)
+        first, second = two & (across <= back), two & (across > back)
+        parts += [_stack(two, ab, b, bc)]
+        parts += [_stack(first, a, ab, bc), _stack(first, a, bc, c)]
+        parts += [_stack(second, a, ab, c), _stack(second, ab, bc, c)]
+    a, b, c = faces.T
+    ab, bc, ca = cut.T
+    all_ = count == 3
+    parts += [_stack(all_, a, ab, ca), _stack(all_, ab, b, bc)]
+    parts += [_stack(all_, ca, bc, c), _stack(all_, ab, bc, ca)]
+    return np.concatenate(parts).astype(np.uint32)
+
+
+def _stack(rows: NDArray[np.bool_], *corners: NDArray[np.integer]) -> NDArray[np.int64]:
+    """(N, 3) faces from three columns, at the rows that are chosen."""
+    return np.stack([column[rows].astype(np.int64) for column in corners], axis=1)

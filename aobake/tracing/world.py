@@ -1,0 +1,189 @@
+"""The scene as the tracer sees it: conditioned, rounded to float32, in one tree.
+
+A mesh that stands in one place is put there in float64, before it is rounded. A mesh that stands in
+several is kept once, in a unit frame of its own, and instanced by Embree. So is the memory: a forest
+of one tree costs one tree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aobake.tracing import embree
+from aobake.tracing.conditioning import UnitFrame, shortest_edges, split_long_edges, unit_frame
+
+__all__ = ["Placement", "Triangles", "World", "build_world"]
+
+FloatArray = NDArray[np.float64]
+WorldArrays: TypeAlias = tuple[
+    NDArray[np.float32], NDArray[np.uint32], NDArray[np.int64], NDArray[np.int64], int,
+    NDArray[np.int64], FloatArray, FloatArray,
+]  # fmt: skip
+
+SLACK = 8 * 2.0**-24  # of a transform's reach: Embree applies it in float32, to the ray
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """Triangles in a space of their own.
+
+    vertices : (V, 3) float64; faces with a vertex that is not finite must have been left out
+    faces : (F, 3) uint32
+    hit_filter : address of Embree's filter function for these triangles; 0: every hit counts
+    """
+
+    vertices: FloatArray
+    faces: NDArray[np.uint32]
+    hit_filter: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Triangles number `part`, placed by a finite (3, 4) float64 transform."""
+
+    part: int
+    transform: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """A built scene.
+
+    tree : Embree's
+    frame : from the scene's space to the tree's
+    arrays : what origins.py looks triangles up in: vertices (N, 3) float32, faces (M, 3) uint32, first
+        vertex and first face of each body, number of bodies that stand where they are, body of each
+        instance behind those, transforms (I, 3, 4) float64 and slack (I,) of each instance
+    """
+
+    tree: embree.Tree
+    frame: UnitFrame
+    arrays: WorldArrays
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """Conditioned triangles that become one geometry of Embree's."""
+
+    vertices: FloatArray
+    faces: NDArray[np.uint32]
+    hit_filter: int
+
+
+def build_world(parts: Sequence[Triangles], placements: Sequence[Placement]) -> World:
+    """Condition and build what stands in a scene. Raises EngineError."""
+    uses = np.bincount([p.part for p in placements], minlength=len(parts))
+    instanced = [bool(uses[p.part] > 1 and _invertible(p.transform)) for p in placements]
+    fixed = [p for p, shared in zip(placements, instanced, strict=True) if not shared]
+    moving = [p for p, shared in zip(placements, instanced, strict=True) if shared]
+    frame = unit_frame([_place(p.transform, _spread(parts[p.part])) for p in placements])
+    bodies = _fixed_bodies(parts, fixed, moving, frame)
+    kept = sorted({p.part for p in moving})
+    frames = {number: unit_frame([_spread(parts[number])]) for number in kept}
+    for number in kept:
+        part = parts[number]
+        bodies.append(_Body(frames[number].apply(part.vertices), part.faces, part.hit_filter))
+    arrays = _pool(bodies, len(bodies) - len(kept), *_instances(moving, kept, frames, frame))
+    return World(_tree(bodies, arrays), frame, arrays)
+
+
+def _invertible(transform: FloatArray) -> bool:
+    """Whether an instance can have this transform; a flattened one is put in place instead."""
+    linear = transform[:, :3]
+    size = float(np.abs(linear).max())
+    return size > 0.0 and abs(float(np.linalg.det(linear / size))) > 1e-6
+
+
+def _place(transform: FloatArray, points: FloatArray) -> FloatArray:
+    """(N, 3) points where the transform puts them; untouched by the identity, to the last bit."""
+    if np.array_equal(transform, np.eye(3, 4)):
+        return points
+    return points @ transform[:, :3].T + transform[:, 3]
+
+
+def _spread(part: Triangles) -> FloatArray:
+    """The vertices that faces use, without the others, which may lie anywhere."""
+    used = np.zeros(len(part.vertices), bool)
+    used[part.faces.reshape(-1)] = True
+    return part.vertices if used.all() else part.vertices[used]
+
+
+def _fixed_bodies(
+    parts: Sequence[Triangles],
+    fixed: Sequence[Placement],
+    moving: Sequence[Placement],
+    frame: UnitFrame,
+) -> list[_Body]:
+    """One body per filter, of all that stands where it is, with large triangles split."""
+    placed = [frame.apply(_place(p.transform, parts[p.part].vertices)) for p in [*fixed, *moving]]
+    sizes = [shortest_edges(at, parts[p.part].faces) for at, p in zip(placed, [*fixed, *moving], strict=True)]
+    details = [at[np.isfinite(size)] for at, size in zip(placed, sizes, strict=True)]
+    fine = [size[np.isfinite(size)] for size in sizes]
+    bodies = []
+    for hit_filter in sorted({parts[p.part].hit_filter for p in fixed}):
+        split = [
+            split_long_edges(at, parts[p.part].faces, details, fine)
+            for at, p in zip(placed, fixed, strict=False)
+            if parts[p.part].hit_filter == hit_filter
+        ]
+        first = np.cumsum([0, *(len(vertices) for vertices, _ in split)])
+        faces = [faces + np.uint32(start) for (_, faces), start in zip(split, first, strict=False)]
+        bodies.append(_Body(_joined([v for v, _ in split]), _joined(faces), hit_filter))
+    return bodies
+
+
+def _joined(arrays: list[NDArray]) -> NDArray:
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def _instances(
+    moving: Sequence[Placement], kept: Sequence[int], frames: Mapping[int, UnitFrame], frame: UnitFrame
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    """Which kept body each instance is, its (3, 4) transform from that body's frame, its slack."""
+    matrices = np.empty((len(moving), 3, 4))
+    for number, placement in enumerate(moving):
+        own = frames[placement.part]
+        linear, shift = placement.transform[:, :3], placement.transform[:, 3]
+        matrices[number, :, :3] = linear * (frame.scale / own.scale)
+        matrices[number, :, 3] = (linear @ own.center + shift - frame.center) * frame.scale
+    reach = np.abs(matrices).sum(axis=2).max(axis=1) if len(moving) else np.zeros(0)
+    body = np.array([kept.index(p.part) for p in moving], np.int64)
+    return body, matrices, SLACK * reach
+
+
+def _pool(
+    bodies: Sequence[_Body],
+    fixed: int,
+    instances: NDArray[np.int64],
+    matrices: FloatArray,
+    slacks: FloatArray,
+) -> WorldArrays:
+    """All bodies in one pair of float32 and uint32 buffers, with room for Embree to read ahead."""
+    first_vertex = np.cumsum([0, *(len(body.vertices) for body in bodies)])
+    first_face = np.cumsum([0, *(len(body.faces) for body in bodies)])
+    spare = -(-embree.READ_AHEAD_BYTES // embree.VERTEX_BYTES)
+    vertices = np.zeros((first_vertex[-1] + spare, 3), np.float32)
+    faces = np.zeros((first_face[-1], 3), np.uint32)
+    for number, body in enumerate(bodies):
+        vertices[first_vertex[number] : first_vertex[number + 1]] = body.vertices
+        faces[first_face[number] : first_face[number + 1]] = body.faces
+    return vertices, faces, first_vertex, first_face, fixed, instances, matrices, slacks
+
+
+def _tree(bodies: Sequence[_Body], arrays: WorldArrays) -> embree.Tree:
+    vertices, faces, first_vertex, first_face, fixed, instances, matrices, _ = arrays
+    geometry = [
+        embree.Body(
+            vertices[first_vertex[k] : first_vertex[k + 1]],
+            faces[first_face[k] : first_face[k + 1]],
+            body.hit_filter,
+        )
+        for k, body in enumerate(bodies)
+    ]
+    placed = list(zip(instances.tolist(), matrices.astype(np.float32), strict=True))
+    return embree.build_tree(geometry[:fixed], geometry[fixed:], placed)
