@@ -6,7 +6,9 @@ squared differences D of successive values count those boundary rays, so
 
     standard error = sqrt(SPREAD D + UNSEEN^2) / n
 
-SPREAD is calibrated on closed-form scenes and scans; for independent samples it would be 1/2 (J. von
+Measured against 32,768 rays on a bumpy sphere, two characters and a cave, at 16 to 4,096 rays: the
+squared error of n times the mean is 0.3 where all rays agree, then grows by 0.09 for each unit of D up
+to D = 150. For independent samples SPREAD would be 1/2 (J. von
 Neumann et al., The mean square successive difference, Annals of Mathematical Statistics 12, 1941; its
 use for systematic samples: K. Wolter, JASA 79, 1984). UNSEEN stands for what is too small to be met by
 any ray: a point where all rays agree is not exact. The binomial formula sqrt(A (1 - A) / n) would be
@@ -37,8 +39,8 @@ __all__ = ["Estimates", "Request", "estimate"]
 FloatArray = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
-SPREAD = 0.20
-UNSEEN = 0.35
+SPREAD = 0.09
+UNSEEN = 0.55
 FIRST_ROUND = 64  # rays of the first round towards a tolerance
 SMALLEST_ROUND = 16
 BLOCK_RAYS = 1 << 18  # about 40 ms of one thread: often enough to stop promptly, seldom enough to cost nothing
