@@ -7,6 +7,7 @@ numbers, and what truly lies within the ball is decided in float64 by the caller
 from __future__ import annotations
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -14,11 +15,15 @@ from numba import carray, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from aobake.tracing.compiled import callback, inlined
+from numpy.typing import NDArray
 
-__all__ = ["NO_INSTANCE", "CANDIDATES", "candidates_near", "note_triangle", "query_buffers"]
+from aobake.tracing.compiled import aligned, callback, inlined
+from aobake.tracing.vectors import cross, dot, length, minus, row
+
+__all__ = ["MOST_TOUCHING", "Touching", "new_touching", "note_triangle", "query_buffers", "touching"]
 
 CANDIDATES = 1024  # triangles noted for one ball; what a fan of more needles adds changes no decision
+MOST_TOUCHING = 128  # triangles weighed at one point
 NO_INSTANCE = 0xFFFFFFFF
 QUERY_FLOATS, CONTEXT_WORDS = 16, 48  # RTCPointQuery and RTCPointQueryContext, with room to spare
 CONTEXT_INSTANCE = 32  # its instID, behind two 4x4 matrices; Embree resets it when it leaves an instance
@@ -72,22 +77,21 @@ def note_triangle() -> int:
     return callback(types.boolean(types.voidptr), _note)
 
 
-@inlined
-def query_buffers():  # type: ignore[no-untyped-def]
-    """Memory for queries of one thread: (query, context, found)."""
-    query = np.zeros(QUERY_FLOATS + 16, np.float32)
-    context = np.zeros(CONTEXT_WORDS + 16, np.uint32)
-    first = (-(query.ctypes.data // 4)) % 16
-    start = (-(context.ctypes.data // 4)) % 16
-    return query[first:], context[start:], np.zeros(1 + 3 * CANDIDATES, np.uint32)
+def query_buffers() -> tuple[NDArray[np.generic], NDArray[np.generic], NDArray[np.generic]]:
+    """Memory for the queries of one thread: RTCPointQuery, RTCPointQueryContext, what was noted."""
+    return (
+        aligned(QUERY_FLOATS, np.float32),
+        aligned(CONTEXT_WORDS, np.uint32),
+        aligned(1 + 3 * CANDIDATES, np.uint32),
+    )
 
 
 @inlined
 def candidates_near(function, note, scene, point, radius, buffers):  # type: ignore[no-untyped-def]
-    """Note the triangles of all leaves that a ball touches; returns (C, 3) uint32 rows.
+    """Note the triangles of all leaves that a ball touches in the last of the buffers.
 
-    Rows are (instance or NO_INSTANCE, geometry, primitive), in an order that does not depend on how
-    the tree was built.
+    It then holds their number C and C rows (instance or NO_INSTANCE, geometry, primitive), in an order
+    that does not depend on how the tree was built.
     """
     query, context, found = buffers
     query[0], query[1], query[2] = point[0], point[1], point[2]
@@ -97,15 +101,146 @@ def candidates_near(function, note, scene, point, radius, buffers):  # type: ign
     call_point_query(
         function, scene, query.ctypes.data, context.ctypes.data, note, found.ctypes.data
     )
-    rows = found[1 : 1 + 3 * found[0]].reshape(-1, 3)
-    for i in range(1, len(rows)):
-        a, b, c = rows[i, 0], rows[i, 1], rows[i, 2]
+    for i in range(1, np.int64(found[0])):
+        a, b, c = found[1 + 3 * i], found[2 + 3 * i], found[3 + 3 * i]
         j = i - 1
-        while j >= 0 and (
-            rows[j, 0] > a
-            or (rows[j, 0] == a and (rows[j, 1] > b or (rows[j, 1] == b and rows[j, 2] > c)))
-        ):
-            rows[j + 1] = rows[j]
+        while j >= 0 and comes_after(found, j, a, b, c):
+            for k in range(1, 4):
+                found[3 * j + 3 + k] = found[3 * j + k]
             j -= 1
-        rows[j + 1, 0], rows[j + 1, 1], rows[j + 1, 2] = a, b, c
-    return rows
+        found[3 * j + 4], found[3 * j + 5], found[3 * j + 6] = a, b, c
+
+
+@inlined
+def comes_after(found, j, a, b, c):  # type: ignore[no-untyped-def]
+    """Whether row j of the noted triangles comes after (a, b, c)."""
+    x, y, z = found[1 + 3 * j], found[2 + 3 * j], found[3 + 3 * j]
+    return x > a or (x == a and (y > b or (y == b and z > c)))
+
+
+class Touching(NamedTuple):
+    """The triangles that touch a point, relative to it; the first `count` rows are filled.
+
+    corners : (3 K, 3) float64
+    fronts : (K, 3) float64, unit normals
+    inward : (K, 3) float64, unit vectors from the point towards their centres, within their planes
+    extent : how far their farthest corner is away
+    slack : how far the transform of an instance among them may be off
+    """
+
+    count: int
+    corners: NDArray[np.float64]
+    fronts: NDArray[np.float64]
+    inward: NDArray[np.float64]
+    extent: float
+    slack: float
+
+
+def new_touching() -> Touching:
+    """Memory for the triangles at one point."""
+    return Touching(
+        0,
+        np.empty((3 * MOST_TOUCHING, 3)),
+        np.empty((MOST_TOUCHING, 3)),
+        np.empty((MOST_TOUCHING, 3)),
+        0.0,
+        0.0,
+    )
+
+
+@inlined
+def load_corners(world, found, n, point, corners, first):  # type: ignore[no-untyped-def]
+    """Put the corners of candidate n, in float64, relative to the point, into rows from `first` on."""
+    vertices, faces, first_vertex, first_face, flat, placed, matrices, _ = world
+    alone = found[1 + 3 * n] == NO_INSTANCE
+    instance = np.int64(found[1 + 3 * n]) - flat
+    body = np.int64(found[2 + 3 * n]) if alone else flat + placed[instance]
+    face = first_face[body] + np.int64(found[3 + 3 * n])
+    for k in range(3):
+        v = row(vertices, first_vertex[body] + np.int64(faces[face, k]))
+        for i in range(3):
+            x = v[i]
+            if not alone:
+                m = row(matrices, 3 * instance + i)
+                x = dot(m, v) + matrices[3 * instance + i, 3]
+            corners[first + k, i] = x - point[i]
+
+
+@inlined
+def out_of_reach(a, b, c, radius):  # type: ignore[no-untyped-def]
+    """Whether the box around a triangle is farther away from 0 than the radius."""
+    for i in range(3):
+        if min(a[i], b[i], c[i]) > radius or max(a[i], b[i], c[i]) < -radius:
+            return True
+    return False
+
+
+@inlined
+def distance_to_triangle(a, b, c):  # type: ignore[no-untyped-def]
+    """How far the triangle a b c is from 0. Source: Ericson, Real-Time Collision Detection, 5.1.5."""
+    ab, ac = minus(b, a), minus(c, a)
+    d1, d2 = -dot(ab, a), -dot(ac, a)
+    d3, d4 = -dot(ab, b), -dot(ac, b)
+    d5, d6 = -dot(ab, c), -dot(ac, c)
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    v, w = 0.0, 0.0
+    if d1 <= 0.0 and d2 <= 0.0:
+        v, w = 0.0, 0.0
+    elif d3 >= 0.0 and d4 <= d3:
+        v, w = 1.0, 0.0
+    elif d6 >= 0.0 and d5 <= d6:
+        v, w = 0.0, 1.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v = d1 / (d1 - d3)
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        w = d2 / (d2 - d6)
+    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:
+        total = va + vb + vc
+        v, w = vb / total, vc / total
+    return length(
+        (a[0] + v * ab[0] + w * ac[0], a[1] + v * ab[1] + w * ac[1], a[2] + v * ab[2] + w * ac[2])
+    )
+
+
+@inlined
+def touching(ask, world, point, radius, buffers, near):  # type: ignore[no-untyped-def]
+    """The triangles within a radius of the point, as a Touching that uses the memory of `near`.
+
+    ask : (address of rtcPointQuery, address of the callback, address of the tree)
+    world : the arrays of world.World
+    """
+    found = buffers[2]
+    candidates_near(ask[0], ask[1], ask[2], point, radius, buffers)
+    count, extent, slack = 0, 0.0, 0.0
+    for n in range(np.int64(found[0])):
+        if count == MOST_TOUCHING:
+            break
+        load_corners(world, found, n, point, near.corners, 3 * count)
+        a, b, c = (
+            row(near.corners, 3 * count), row(near.corners, 3 * count + 1), row(near.corners, 3 * count + 2),
+        )  # fmt: skip
+        alone = found[1 + 3 * n] == NO_INSTANCE
+        loose = 0.0 if alone else world[7][np.int64(found[1 + 3 * n]) - world[4]]
+        reach = radius + loose
+        if out_of_reach(a, b, c, reach):
+            continue
+        front = cross(minus(b, a), minus(c, a))
+        size = length(front)
+        if not size > 0.0 or not distance_to_triangle(a, b, c) <= reach:
+            continue
+        front = (front[0] / size, front[1] / size, front[2] / size)
+        middle = (a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2])
+        rise = dot(middle, front)
+        inward = minus(middle, (rise * front[0], rise * front[1], rise * front[2]))
+        size = length(inward)
+        scale = 1.0 / size if size > 0.0 else 0.0
+        for i in range(3):
+            near.fronts[count, i] = front[i]
+            near.inward[count, i] = scale * inward[i]
+        extent = max(extent, length(a), length(b), length(c))
+        slack = max(slack, loose)
+        count += 1
+    return Touching(count, near.corners, near.fronts, near.inward, extent, slack)

@@ -30,7 +30,9 @@ from aobake.settings import BakeSettings
 from aobake.tracing import embree
 from aobake.tracing.contacts import note_triangle
 from aobake.tracing.kernels import LINEAR, SMOOTH, trace
+from aobake.tracing.kernels import scratch as kernel_scratch
 from aobake.tracing.origins import ENCLOSED, place_origins
+from aobake.tracing.origins import scratch as origins_scratch
 from aobake.tracing.sampling import direction_sets
 from aobake.tracing.world import World
 
@@ -138,6 +140,7 @@ def _block(
         world.arrays,
         positions,
         normals,
+        origins_scratch(),
         origins,
         states,
     )
@@ -236,6 +239,7 @@ def _trace(
         np.float32(far),
         ground,
         falloff,
+        kernel_scratch(),
         sums,
     )
     return sums

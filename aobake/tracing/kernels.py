@@ -20,17 +20,18 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from aobake.tracing.compiled import inlined, kernel
+from numpy.typing import NDArray
 
-__all__ = ["LINEAR", "SMOOTH", "trace"]
+from aobake.tracing.compiled import aligned, inlined, tight_kernel
+
+__all__ = ["LINEAR", "SMOOTH", "scratch", "trace"]
 
 LINEAR, SMOOTH = 0, 1
 
 # Rows of RTCRay8 and RTCHit8, eight 32-bit values each.
 ORIGIN, NEAR, DIRECTION, TIME, FAR, MASK, FLAGS = 0, 3, 4, 7, 8, 9, 11
 GEOMETRY_ID, INSTANCE_ID = 18, 19
-RAY_FLOATS, RAY_HIT_FLOATS = 12 * 8, 21 * 8
-ALIGNED_FLOATS = 16  # 64 bytes: a cache line, and what Embree's widest loads want
+RAY_HIT_FLOATS = 21 * 8
 
 
 @intrinsic
@@ -95,13 +96,6 @@ def aim(rays, directions, frame, far):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def aligned(buffer):  # type: ignore[no-untyped-def]
-    """The part of a float32 or int32 buffer that begins at a 64-byte boundary."""
-    first = (-(buffer.ctypes.data // 4)) % ALIGNED_FLOATS
-    return buffer[first:]
-
-
-@inlined
 def set_out(rays, origin):  # type: ignore[no-untyped-def]
     """Put the origin of all eight rays; the rows that stay the same for every packet of a point."""
     for k in range(8):
@@ -111,9 +105,8 @@ def set_out(rays, origin):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def ready(rays):  # type: ignore[no-untyped-def]
+def ready(rays, words):  # type: ignore[no-untyped-def]
     """Rows that no packet changes: near end, time, mask and flags."""
-    words = rays.view(np.int32)
     for k in range(8):
         rays[8 * NEAR + k] = 0.0
         rays[8 * TIME + k] = 0.0
@@ -160,9 +153,15 @@ def openness(reached, far, falloff):  # type: ignore[no-untyped-def]
     return u if falloff == LINEAR else u * u * (3.0 - 2.0 * u)
 
 
-@kernel
+def scratch() -> tuple[NDArray[np.generic], NDArray[np.generic], NDArray[np.generic], NDArray[np.float32]]:
+    """Memory for trace, of one thread: a packet, its words, two masks, a frame."""
+    packet = aligned(RAY_HIT_FLOATS, np.float32)
+    return packet, packet.view(np.int32), aligned(16, np.int32), np.zeros((3, 3), np.float32)
+
+
+@tight_kernel
 def trace(  # type: ignore[no-untyped-def]
-    functions, scene, origins, normals, geometric, numbers, seed, sets, rays, far, ground, falloff, out
+    functions, scene, origins, normals, geometric, numbers, seed, sets, rays, far, ground, falloff, scratch, out
 ):
     """Trace `rays` directions from each point and add up how open they are.
 
@@ -175,15 +174,12 @@ def trace(  # type: ignore[no-untyped-def]
     far : float32, where rays end; may be infinite
     ground : (axis, (P,) float32 heights of the origins above it), or None
     falloff : LINEAR or SMOOTH, for which the nearest hit is looked for; None: any hit closes a ray
+    scratch : of scratch()
     out : (P, 3) float64: sum of openness, sum of squared successive differences, rays counted
     """
-    buffer = np.empty(RAY_HIT_FLOATS + ALIGNED_FLOATS, np.float32)
-    packet = aligned(buffer)
-    words = packet.view(np.int32)
-    masks = aligned(np.empty(16 + ALIGNED_FLOATS, np.int32))
+    packet, words, masks, frame = scratch
     valid, counts = masks[:8], masks[8:16]
-    frame = np.empty((3, 3), np.float32)
-    ready(packet)
+    ready(packet, words)
     call = functions[0] if falloff is None else functions[1]
     for point in range(len(origins)):
         bits = mix(seed, numbers[point])

@@ -58,7 +58,7 @@ class World:
     frame : from the scene's space to the tree's
     arrays : what origins.py looks triangles up in: vertices (N, 3) float32, faces (M, 3) uint32, first
         vertex and first face of each body, number of bodies that stand where they are, body of each
-        instance behind those, transforms (I, 3, 4) float64 and slack (I,) of each instance
+        instance behind those, transforms (3 I, 4) float64 and slack (I,) of each instance
     """
 
     tree: embree.Tree
@@ -172,11 +172,13 @@ def _pool(
     for number, body in enumerate(bodies):
         vertices[first_vertex[number] : first_vertex[number + 1]] = body.vertices
         faces[first_face[number] : first_face[number + 1]] = body.faces
-    return vertices, faces, first_vertex, first_face, fixed, instances, matrices, slacks
+    rows = matrices.reshape(-1, 4)
+    return vertices, faces, first_vertex, first_face, fixed, instances, rows, slacks
 
 
 def _tree(bodies: Sequence[_Body], arrays: WorldArrays) -> embree.Tree:
-    vertices, faces, first_vertex, first_face, fixed, instances, matrices, _ = arrays
+    vertices, faces, first_vertex, first_face, fixed, instances, rows, _ = arrays
+    matrices = rows.reshape(-1, 3, 4)
     geometry = [
         embree.Body(
             vertices[first_vertex[k] : first_vertex[k + 1]],
