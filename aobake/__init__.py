@@ -5,7 +5,14 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from aobake.errors import AobakeError, Cancelled, EngineError, InputError, OutputError, SettingsError
+from aobake.errors import (
+    AobakeError,
+    Cancelled,
+    EngineError,
+    InputError,
+    OutputError,
+    SettingsError,
+)
 from aobake.plan import Effect, Plan, plan
 from aobake.settings import BakeSettings, StoreSettings
 

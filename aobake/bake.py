@@ -5,22 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aobake.errors import InputError
+from aobake.findings import Finding, FindingKind
 from aobake.meshes.normals import unit_rows
 from aobake.meshes.scene import Instance, Scene
-from aobake.meshes.surface import Findings, Surface, surface_of
+from aobake.meshes.surface import Surface, findings, surface_of
 from aobake.plan import plan
 from aobake.points import SurfacePoints
 from aobake.results import BakedVertices, Estimate
 from aobake.settings import BakeSettings
 from aobake.tracing.backfaces import pass_through_backfaces
 from aobake.tracing.estimate import Estimates, Request, estimate
-from aobake.tracing.origins import DOUBTFUL, ENCLOSED
+from aobake.tracing.origins import CONTACT, DOUBTFUL, ENCLOSED, THIN
 from aobake.tracing.world import Placement, Triangles, World, build_world
 
 __all__ = ["bake_vertices", "visibility"]
@@ -48,19 +49,25 @@ def bake_vertices(
         it raises stops the bake within a fraction of a second, as does a KeyboardInterrupt
     Vertices that no face uses, that are not finite or that have no normal come out as 1, with a warning
     where a face uses them. A scene without triangles gives arrays of 1; one without vertices, empty ones.
-    Raises EngineError where Embree cannot be used.
+    Raises InputError where settings.strict is on and anything was passed over, mended or is in doubt;
+    EngineError where Embree cannot be used.
     """
     settings = settings or BakeSettings()
     seconds: dict[str, float] = {}
     with _timed(seconds, "prepare"):
         decided = plan(scene, settings)
-        surfaces = [surface_of(mesh) for mesh in scene.meshes]
+        surfaces = _surfaces(scene)
+        if settings.strict:
+            _refuse(scene, [finding for surface in surfaces for finding in surface.findings])
     with _timed(seconds, "build"):
         prepared = _build(scene, surfaces, settings)
         points = _vertex_points(scene, prepared)
     with _timed(seconds, "trace"):
         found = _estimate(prepared, points, settings, progress)
     ao, error = _per_instance(scene, prepared, found)
+    found_out = _findings(scene, prepared, found)
+    if settings.strict:
+        _refuse(scene, found_out)
     return BakedVertices(
         scene=scene,
         settings=settings,
@@ -69,7 +76,8 @@ def bake_vertices(
         standard_error=error,
         rays=int(found.rays.sum(dtype=np.int64)),
         seconds=seconds,
-        warnings=(*scene.warnings, *_warnings(scene, prepared, found)),
+        findings=found_out,
+        warnings=(*scene.warnings, *_not_placed(scene), *map(str, found_out)),
     )
 
 
@@ -93,7 +101,9 @@ def visibility(
     settings = settings or BakeSettings()
     at = _rows("positions", positions)
     around = _matching("normals", normals, at)
-    above = None if geometric_normals is None else _matching("geometric_normals", geometric_normals, at)
+    above = (
+        None if geometric_normals is None else _matching("geometric_normals", geometric_normals, at)
+    )
     usable = np.isfinite(at).all(axis=1) & around.any(axis=1)
     if above is not None:
         usable &= above.any(axis=1)
@@ -104,7 +114,7 @@ def visibility(
         geometric=None if above is None else above[chosen],
         numbers=chosen,
     )
-    prepared = _build(scene, [surface_of(mesh) for mesh in scene.meshes], settings)
+    prepared = _build(scene, _surfaces(scene), settings)
     found = _estimate(prepared, points, settings, None)
     mean, error = np.ones(len(at), np.float32), np.zeros(len(at), np.float32)
     rays = np.zeros(len(at), np.int32)
@@ -117,6 +127,22 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     start = time.perf_counter()
     yield
     seconds[stage] = time.perf_counter() - start
+
+
+def _surfaces(scene: Scene) -> list[Surface]:
+    return [
+        surface_of(mesh, f"mesh {mesh.name!r}" if mesh.name else f"mesh {number}")
+        for number, mesh in enumerate(scene.meshes)
+    ]
+
+
+def _not_placed(scene: Scene) -> list[str]:
+    """A line for each instance whose transform puts it nowhere."""
+    return [
+        f"{_name(scene, number)}: its transform is not finite; it was passed over."
+        for number, instance in enumerate(scene.instances)
+        if not np.isfinite(instance.transform).all()
+    ]
 
 
 def _build(scene: Scene, surfaces: Sequence[Surface], settings: BakeSettings) -> Prepared:
@@ -137,7 +163,9 @@ def _build(scene: Scene, surfaces: Sequence[Surface], settings: BakeSettings) ->
         if key not in parts:
             parts[key] = len(triangles)
             faces = surface.faces[:, [0, 2, 1]] if mirrored else surface.faces
-            triangles.append(Triangles(mesh.vertices, faces, _hit_filter(scene, mesh.material, settings)))
+            triangles.append(
+                Triangles(mesh.vertices, faces, _hit_filter(scene, mesh.material, settings))
+            )
         if len(surface.faces):
             placements.append(Placement(parts[key], transform))
             used = mesh.vertices[np.unique(surface.faces)]
@@ -212,7 +240,10 @@ def _per_instance(
     means, errors = [], []
     first = 0
     for (instance, mesh), stands in zip(scene.placed(), prepared.placed, strict=True):
-        mean, error = np.ones(len(mesh.vertices), np.float32), np.zeros(len(mesh.vertices), np.float32)
+        mean, error = (
+            np.ones(len(mesh.vertices), np.float32),
+            np.zeros(len(mesh.vertices), np.float32),
+        )
         if stands is not None:
             asked = np.flatnonzero(_asked(instance, stands[1]))
             mean[asked] = found.mean[first : first + len(asked)]
@@ -224,32 +255,43 @@ def _per_instance(
     return means, errors
 
 
-def _warnings(scene: Scene, prepared: Prepared, found: Estimates) -> list[str]:
-    """What was passed over, mended or doubtful, one line per mesh and finding."""
-    sentences = {
-        "non_finite_vertices": "vertices are not finite and were passed over",
-        "non_finite_faces": "faces have a vertex that is not finite and were passed over",
-        "degenerate_faces": "faces use a vertex twice and were passed over",
-        "reoriented_faces": "faces were wound against their neighbours and were turned for the bake",
-        "replaced_normals": "normals are zero or not finite and were computed from the faces",
-        "undefined_normals": "vertices have no normal that could be told and were left open (1)",
+def _findings(scene: Scene, prepared: Prepared, found: Estimates) -> tuple[Finding, ...]:
+    """What was found about the meshes, then about the points of each instance."""
+    kinds: dict[FindingKind, int] = {
+        "contact": CONTACT,
+        "thin": THIN,
+        "doubtful": DOUBTFUL,
+        "enclosed": ENCLOSED,
     }
-    lines = []
-    for mesh, surface in zip(scene.meshes, prepared.surfaces, strict=True):
-        for field in fields(Findings):
-            number = getattr(surface.findings, field.name)
-            if number:
-                lines.append(f"mesh {mesh.name!r}: {number} {sentences[field.name]}.")
-    for instance, stands in zip(scene.instances, prepared.placed, strict=True):
+    lines = [finding for surface in prepared.surfaces for finding in surface.findings]
+    first = 0
+    for number, stands in enumerate(prepared.placed):
         if stands is None:
-            lines.append(f"instance {instance.name!r}: its transform is not finite; it was passed over.")
-    enclosed = int((found.states == ENCLOSED).sum())
-    if enclosed:
-        lines.append(f"{enclosed} points lie face to face on another surface and came out as 0.")
-    doubtful = int((found.states == DOUBTFUL).sum())
-    if doubtful:
-        lines.append(f"{doubtful} points have no side in front of all that touches them; they are doubtful.")
-    return lines
+            continue
+        asked = np.flatnonzero(_asked(*stands))
+        states = found.states[first : first + len(asked)]
+        first += len(asked)
+        for kind, state in kinds.items():
+            marks = np.zeros(len(stands[1].asked), bool)
+            marks[asked[states == state]] = True
+            lines += findings(_name(scene, number), {kind: marks})
+    return tuple(lines)
+
+
+def _name(scene: Scene, number: int) -> str:
+    """What a user would call an instance."""
+    instance = scene.instances[number]
+    mesh = scene.meshes[instance.mesh].name
+    name = instance.name or mesh
+    return f"{name!r}" if name else f"mesh {instance.mesh}"
+
+
+def _refuse(scene: Scene, found: Sequence[Finding]) -> None:
+    """Raise InputError for the first finding: the caller asked for strictness."""
+    if found:
+        who = f"{scene.source.path}: " if scene.source else ""
+        more = f" And {len(found) - 1} more findings." if len(found) > 1 else ""
+        raise InputError(f"{who}{found[0]}{more} Mend the asset, or bake it without strict.")
 
 
 def _rows(name: str, values: ArrayLike) -> FloatArray:
@@ -267,5 +309,7 @@ def _rows(name: str, values: ArrayLike) -> FloatArray:
 def _matching(name: str, values: ArrayLike, positions: FloatArray) -> FloatArray:
     vectors = _rows(name, values)
     if len(vectors) != len(positions):
-        raise InputError(f"there are {len(vectors)} {name} for {len(positions)} positions; one each is needed.")
+        raise InputError(
+            f"there are {len(vectors)} {name} for {len(positions)} positions; one each is needed."
+        )
     return unit_rows(vectors)

@@ -60,7 +60,9 @@ def check_writable(path: Path) -> None:
     if not folder.is_dir():
         raise OutputError(f"{path}: there is no folder {folder}. Make it, or write somewhere else.")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(f"{path}: nothing can be written into the folder {folder}. Change its permissions.")
+        raise OutputError(
+            f"{path}: nothing can be written into the folder {folder}. Change its permissions."
+        )
 
 
 def write_files(files: Mapping[Path, Content]) -> None:

@@ -64,7 +64,9 @@ def _occlusion(scene: Scene) -> Effect:
 
 def _instances(scene: Scene) -> Effect:
     placed = [instance.mesh for instance in scene.instances]
-    shared = sorted({mesh for mesh in placed if placed.count(mesh) > 1}) if len(placed) < 64 else None
+    shared = (
+        sorted({mesh for mesh in placed if placed.count(mesh) > 1}) if len(placed) < 64 else None
+    )
     if shared is None:
         counts: dict[int, int] = {}
         for mesh in placed:
@@ -73,7 +75,9 @@ def _instances(scene: Scene) -> Effect:
     if not shared:
         return Effect(False, "Every mesh stands in one place.")
     name = scene.meshes[shared[0]].name or f"number {shared[0]}"
-    return Effect(True, f"{len(shared)} meshes stand in several places, mesh {name!r} among them.", 1.2)
+    return Effect(
+        True, f"{len(shared)} meshes stand in several places, mesh {name!r} among them.", 1.2
+    )
 
 
 def _max_distance(settings: BakeSettings) -> Effect:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from aobake.errors import OutputError
 from aobake.files import same_file
+from aobake.findings import Finding
 from aobake.meshes import formats
 from aobake.meshes.scene import Scene
 from aobake.plan import Plan
@@ -43,7 +44,8 @@ class BakedVertices:
     standard_error : the same shapes; 0 where nothing had to be estimated
     rays : rays spent on the whole scene
     seconds : stage -> seconds ("prepare", "build", "trace")
-    warnings : what was passed over, mended or doubtful, one line each
+    findings : what was passed over, mended or is in doubt, counted and located
+    warnings : the same, with what the reader had to say, one line each
     """
 
     scene: Scene
@@ -53,6 +55,7 @@ class BakedVertices:
     standard_error: list[Float32Array]
     rays: int
     seconds: Mapping[str, float]
+    findings: tuple[Finding, ...]
     warnings: tuple[str, ...]
 
 

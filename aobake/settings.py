@@ -20,7 +20,9 @@ GroundAxis = Literal["+y", "+z"]
 Method = Literal["point"]
 Store = Literal["color", "occlusion", "attribute"]
 
-MOST_RAYS = 1 << 20  # a direction set of this size takes 12 MiB; the error is below 1e-5 long before
+MOST_RAYS = (
+    1 << 20
+)  # a direction set of this size takes 12 MiB; the error is below 1e-5 long before
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +60,9 @@ class BakeSettings:
     method: Method = "point"
     """How values at vertices are found: point takes the integral at the vertex itself."""
 
+    strict: bool = False
+    """Whether anything that had to be passed over, mended or left in doubt is an error."""
+
     def __post_init__(self) -> None:
         _whole("rays", self.rays, 1, MOST_RAYS)
         _whole("max_rays", self.max_rays, 1, MOST_RAYS)
@@ -81,6 +86,8 @@ class BakeSettings:
         _choice("method", self.method, get_args(Method))
         if self.ground is not None:
             _choice("ground", self.ground, get_args(GroundAxis))
+        if not isinstance(self.strict, bool):
+            raise SettingsError(f"strict is {self.strict!r}; True or False is needed.")
         if self.falloff != "none" and self.max_distance is None:
             raise SettingsError(
                 f"falloff is {self.falloff!r}, but nothing says where it ends: give max_distance as well."
@@ -104,11 +111,17 @@ def _whole(name: str, value: object, least: int, most: int) -> None:
     if isinstance(value, bool) or not hasattr(value, "__index__"):
         raise SettingsError(f"{name} is {value!r}; a whole number is needed.")
     if not least <= value.__index__() <= most:
-        raise SettingsError(f"{name} is {value!r}; a whole number from {least} to {most} is needed.")
+        raise SettingsError(
+            f"{name} is {value!r}; a whole number from {least} to {most} is needed."
+        )
 
 
 def _real(name: str, value: object) -> None:
-    if isinstance(value, bool) or not hasattr(value, "__float__") or not math.isfinite(float(value)):
+    if (
+        isinstance(value, bool)
+        or not hasattr(value, "__float__")
+        or not math.isfinite(float(value))
+    ):
         raise SettingsError(f"{name} is {value!r}; a finite number is needed.")
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.meshes.coincident import first_equal_row
-from aobake.tracing.compiled import inlined, kernel
+from aobake.tracing.compiled import inlined, tight_kernel
+from aobake.tracing.vectors import cross, dot, length, minus, row
 
 __all__ = ["CREASE_DEGREES", "computed_normals", "unit_rows"]
 
@@ -79,70 +80,65 @@ def _corners_by_place(
 
 
 @inlined
-def _front(vertices, face, out):  # type: ignore[no-untyped-def]
-    """Fill out (3,) with the unit normal of a face; zeros for one without area."""
-    a, b, c = vertices[face[0]], vertices[face[1]], vertices[face[2]]
-    u0, u1, u2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    v0, v1, v2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    largest = max(abs(u0), abs(u1), abs(u2), abs(v0), abs(v1), abs(v2))
-    if not largest > 0.0:
-        out[:] = 0.0
-        return
-    u0, u1, u2 = u0 / largest, u1 / largest, u2 / largest
-    v0, v1, v2 = v0 / largest, v1 / largest, v2 / largest
-    out[0], out[1], out[2] = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
-    length = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
-    for i in range(3):
-        out[i] = out[i] / length if length > 0.0 else 0.0
+def scaled(a, size):  # type: ignore[no-untyped-def]
+    return (a[0] / size, a[1] / size, a[2] / size)
 
 
 @inlined
-def _angle(vertices, face, k):  # type: ignore[no-untyped-def]
+def largest(a):  # type: ignore[no-untyped-def]
+    return max(abs(a[0]), abs(a[1]), abs(a[2]))
+
+
+@inlined
+def _front(vertices, faces, f):  # type: ignore[no-untyped-def]
+    """Unit normal of a face; zeros for one without area. Sides are scaled first, against underflow."""
+    a = row(vertices, faces[f, 0])
+    u, v = minus(row(vertices, faces[f, 1]), a), minus(row(vertices, faces[f, 2]), a)
+    size = max(largest(u), largest(v))
+    if not size > 0.0:
+        return (0.0, 0.0, 0.0)
+    normal = cross(scaled(u, size), scaled(v, size))
+    size = length(normal)
+    return scaled(normal, size if size > 0.0 else 1.0)
+
+
+@inlined
+def _angle(vertices, faces, f, k):  # type: ignore[no-untyped-def]
     """Angle of a face at its corner k. Source: W. Kahan's stable form, 2 atan2(|u - v|, |u + v|)."""
-    a, b, c = vertices[face[k]], vertices[face[(k + 1) % 3]], vertices[face[(k + 2) % 3]]
-    u0, u1, u2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    v0, v1, v2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    u, v = max(abs(u0), abs(u1), abs(u2)), max(abs(v0), abs(v1), abs(v2))
-    if not (u > 0.0 and v > 0.0):
+    a = row(vertices, faces[f, k])
+    u = minus(row(vertices, faces[f, (k + 1) % 3]), a)
+    v = minus(row(vertices, faces[f, (k + 2) % 3]), a)
+    if not (largest(u) > 0.0 and largest(v) > 0.0):
         return 0.0
-    u0, u1, u2 = u0 / u, u1 / u, u2 / u
-    v0, v1, v2 = v0 / v, v1 / v, v2 / v
-    u = np.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
-    v = np.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
-    d0, d1, d2 = u0 / u - v0 / v, u1 / u - v1 / v, u2 / u - v2 / v
-    s0, s1, s2 = u0 / u + v0 / v, u1 / u + v1 / v, u2 / u + v2 / v
-    return 2.0 * np.arctan2(
-        np.sqrt(d0 * d0 + d1 * d1 + d2 * d2), np.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
-    )
+    u, v = scaled(u, largest(u)), scaled(v, largest(v))
+    u, v = scaled(u, length(u)), scaled(v, length(v))
+    return 2.0 * np.arctan2(length(minus(u, v)), length((u[0] + v[0], u[1] + v[1], u[2] + v[2])))
 
 
-@kernel
+@tight_kernel
 def _add_own(vertices, faces, counts, sums):  # type: ignore[no-untyped-def]
     """Add to sums (V, 3) the normals of the faces of each vertex, weighted by their angle there."""
-    front = np.empty(3)
     for f in range(len(faces)):
         if counts[f]:
-            _front(vertices, faces[f], front)
+            front = _front(vertices, faces, f)
             for k in range(3):
-                weight = _angle(vertices, faces[f], k)
+                weight = _angle(vertices, faces, f, k)
                 for i in range(3):
                     sums[faces[f, k], i] += weight * front[i]
 
 
-@kernel
+@tight_kernel
 def _add_around(  # type: ignore[no-untyped-def]
     vertices, faces, counts, place, start, corners, own, cosine, sums
 ):
     """Add to sums (V, 3) the faces that share a vertex's place only, where they bend from it mildly."""
-    front = np.empty(3)
     for v in range(len(place)):
         p = place[v]
         for at in range(start[p], start[p + 1]):
             f, k = corners[at] // 3, corners[at] % 3
             if counts[f] and faces[f, k] != v:
-                _front(vertices, faces[f], front)
-                along = front[0] * own[v, 0] + front[1] * own[v, 1] + front[2] * own[v, 2]
-                if along >= cosine:
-                    weight = _angle(vertices, faces[f], k)
+                front = _front(vertices, faces, f)
+                if dot(front, row(own, v)) >= cosine:
+                    weight = _angle(vertices, faces, f, k)
                     for i in range(3):
                         sums[v, i] += weight * front[i]

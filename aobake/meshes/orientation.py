@@ -11,25 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.tracing.compiled import inlined, kernel
+from aobake.tracing.vectors import cross, dot, length, minus, row
 
 __all__ = ["consistent_winding"]
 
 
 def consistent_winding(
     vertices: NDArray[np.float64], faces: NDArray[np.uint32], place: NDArray[np.int64]
-) -> NDArray[np.bool_]:
-    """(F,) whether each face has to be turned over so that neighbours agree.
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(F,) whether each face has to be turned over, so that neighbours agree; and whether it belongs to
+    a closed part that faces inward all the same, because its winding is consistent.
 
     vertices, faces : (V, 3) float64, (F, 3) uint32
     place : (V,) int64, the first vertex at the same place: soups count as connected where they meet
     Faces are neighbours across edges that exactly two of them share; at any other edge, a fin or a
     Moebius band's seam, nothing can be agreed on and nothing is asked.
     """
-    turned = np.zeros(len(faces), bool)
-    pairs, opposed, open_faces = _neighbours(place[faces])
-    if opposed.any():
-        _settle(vertices, faces, pairs, opposed, open_faces, turned)
-    return turned
+    turned, inward = np.zeros(len(faces), bool), np.zeros(len(faces), bool)
+    if len(faces):
+        _settle(vertices, faces, *_neighbours(place[faces]), turned, inward)
+    return turned, inward
 
 
 def _neighbours(
@@ -72,8 +73,8 @@ def _find(parent, parity, face):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _settle(vertices, faces, pairs, opposed, open_faces, turned):  # type: ignore[no-untyped-def]
-    """Fill turned (F,): a union-find over neighbours that keeps each face's parity to its root."""
+def _settle(vertices, faces, pairs, opposed, open_faces, turned, inward):  # type: ignore[no-untyped-def]
+    """Fill turned and inward (F,): a union-find over neighbours that keeps each face's parity."""
     count = len(faces)
     parent, parity = np.arange(count), np.zeros(count, np.uint8)
     torn = np.zeros(count, np.bool_)  # at roots: somewhere within, neighbours disagree
@@ -91,16 +92,20 @@ def _settle(vertices, faces, pairs, opposed, open_faces, turned):  # type: ignor
     is_open = np.zeros(count, np.bool_)
     for f in range(count):
         root, against = _find(parent, parity, f)
-        if not torn[root]:
-            continue
-        o = vertices[faces[root, 0]]
-        a, b, c = vertices[faces[f, 0]] - o, vertices[faces[f, 1]] - o, vertices[faces[f, 2]] - o
+        o = row(vertices, faces[root, 0])
+        a, b, c = (
+            minus(row(vertices, faces[f, 0]), o),
+            minus(row(vertices, faces[f, 1]), o),
+            minus(row(vertices, faces[f, 2]), o),
+        )
         sign = -1.0 if against else 1.0
-        volume[root] += sign * (a * np.cross(b, c)).sum()
-        area[root] += sign * np.sqrt((np.cross(b - a, c - a) ** 2).sum())
+        volume[root] += sign * dot(a, cross(b, c))
+        area[root] += sign * length(cross(minus(b, a), minus(c, a)))
         is_open[root] |= open_faces[f]
     for f in range(count):
         root, against = _find(parent, parity, f)
         if torn[root]:
             measure = area[root] if is_open[root] else volume[root]
             turned[f] = (against == 1) != (measure < 0.0)
+        else:
+            inward[f] = not is_open[root] and volume[root] < 0.0

@@ -82,7 +82,9 @@ class Mesh:
         where = f"mesh {self.name!r}" if self.name else "mesh"
         vertices = _rows(self.vertices, np.float64, f"{where}: vertices")
         if len(vertices) > MOST_VERTICES:
-            raise InputError(f"{where} has {len(vertices)} vertices; at most {MOST_VERTICES} can be baked.")
+            raise InputError(
+                f"{where} has {len(vertices)} vertices; at most {MOST_VERTICES} can be baked."
+            )
         faces = _faces(self.faces, len(vertices), where)
         object.__setattr__(self, "vertices", _frozen(vertices))
         object.__setattr__(self, "faces", _frozen(faces))
@@ -110,7 +112,9 @@ class Instance:
     def __post_init__(self) -> None:
         transform = np.array(self.transform, np.float64)
         if transform.shape != (4, 4):
-            raise InputError(f"instance {self.name!r}: a transform is (4, 4), not {transform.shape}.")
+            raise InputError(
+                f"instance {self.name!r}: a transform is (4, 4), not {transform.shape}."
+            )
         object.__setattr__(self, "transform", _frozen(transform))
 
 

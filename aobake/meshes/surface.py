@@ -5,32 +5,23 @@ Nothing of the asset itself is changed by any of this; it is how a bake looks at
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from aobake.findings import EXAMPLES, Finding, FindingKind
 from aobake.meshes.coincident import first_equal_row
 from aobake.meshes.normals import CREASE_DEGREES, computed_normals, unit_rows
 from aobake.meshes.orientation import consistent_winding
 from aobake.meshes.scene import Mesh
-from aobake.tracing.compiled import kernel
+from aobake.tracing.compiled import tight_kernel
+from aobake.tracing.vectors import cross, dot, length, minus, row
 
-__all__ = ["Findings", "Surface", "surface_of"]
+__all__ = ["Surface", "findings", "surface_of"]
 
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Findings:
-    """How many elements of a mesh were passed over, mended or left in doubt."""
-
-    non_finite_vertices: int = 0
-    non_finite_faces: int = 0
-    degenerate_faces: int = 0
-    reoriented_faces: int = 0
-    replaced_normals: int = 0
-    undefined_normals: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,80 +33,85 @@ class Surface:
     asked : (V,) bool, the vertices to trace from: used by a face, finite, with a normal, and the first
         of those that have the same place and the same normal
     same_as : (V,) int64, the vertex whose value each one takes
-    findings : what had to be done
+    findings : what was passed over, mended or is in doubt
     """
 
     faces: NDArray[np.uint32]
     normals: FloatArray
     asked: NDArray[np.bool_]
     same_as: NDArray[np.int64]
-    findings: Findings
+    findings: tuple[Finding, ...]
 
 
-def surface_of(mesh: Mesh) -> Surface:
-    """Look at a mesh; never fails, whatever is in it."""
+def surface_of(mesh: Mesh, name: str = "") -> Surface:
+    """Look at a mesh; never fails, whatever is in it.
+
+    name : what findings call it
+    """
     vertices = mesh.vertices
     finite = np.isfinite(vertices).all(axis=1)
     clean = vertices if finite.all() else np.where(finite[:, None], vertices, 0.0)
-    faces = mesh.faces.astype(np.uint32)
-    whole = np.ones(len(faces), bool) if finite.all() else finite[faces].all(axis=1)
-    spread = (
-        (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    )
-    if not (whole & spread).all():
-        faces = faces[whole & spread]
-    faces, normals, reoriented, replaced = _with_normals(mesh, clean, faces)
+    given = mesh.faces.astype(np.uint32)
+    flat = faces_without_area(clean, given)
+    whole = np.ones(len(given), bool) if finite.all() else finite[given].all(axis=1)
+    usable = whole & ~flat
+    faces = given if usable.all() else given[usable]
+    faces, normals, found = _with_normals(mesh, clean, faces)
     defined = normals.any(axis=1)
     used = np.zeros(len(vertices), bool)
     used[faces.reshape(-1)] = True
-    same_as = first_equal_row(clean, normals)
-    # A vertex that no face uses may come first: only those that are traced may stand for others.
-    asked = used & finite & defined
-    same_as = _first_asked(same_as, asked)
+    asked = used & defined
+    same_as = _first_asked(first_equal_row(clean, normals), asked)
+    found |= {
+        "non-finite": ~finite,
+        "degenerate": whole & flat,
+        "no-normal": used & ~defined,
+    }
     return Surface(
         faces=faces,
         normals=normals,
         asked=asked & (same_as == np.arange(len(vertices))),
         same_as=same_as,
-        findings=Findings(
-            non_finite_vertices=int((~finite).sum()),
-            non_finite_faces=int((~whole).sum()),
-            degenerate_faces=int((whole & ~spread).sum()),
-            reoriented_faces=reoriented,
-            replaced_normals=replaced,
-            undefined_normals=int((used & finite & ~defined).sum()),
-        ),
+        findings=findings(name, found),
     )
+
+
+def findings(where: str, found: Mapping[FindingKind, NDArray[np.bool_]]) -> tuple[Finding, ...]:
+    """What is marked, counted and located."""
+    lines = []
+    for kind, marks in found.items():
+        count = int(marks.sum())
+        if count:
+            examples = tuple(np.flatnonzero(marks)[:EXAMPLES].tolist())
+            lines.append(Finding(kind=kind, where=where, count=count, examples=examples))
+    return tuple(lines)
 
 
 def _with_normals(
     mesh: Mesh, vertices: FloatArray, faces: NDArray[np.uint32]
-) -> tuple[NDArray[np.uint32], FloatArray, int, int]:
-    """Faces with one front, unit normals, how many faces were turned, how many normals replaced."""
+) -> tuple[NDArray[np.uint32], FloatArray, dict[FindingKind, NDArray[np.bool_]]]:
+    """Faces with one front, unit normals, and what was done to get them."""
     crease = 0.0 if mesh.flat_shaded else CREASE_DEGREES
-    if mesh.normals is not None:
-        normals = unit_rows(mesh.normals)
-        faces, turned = _turned(faces, _against(vertices, faces, normals))
-        used = np.zeros(len(vertices), bool)
-        used[faces.reshape(-1)] = True
-        lacking = used & ~normals.any(axis=1)
-        if not lacking.any():
-            return faces, normals, 0, 0
+    if mesh.normals is None:
         place = first_equal_row(vertices)
-        computed = computed_normals(vertices, faces, place, crease)
+        turned, inward = consistent_winding(vertices, faces, place)
+        faces = _turned(faces, turned)
+        normals = computed_normals(vertices, faces, place, crease)
+        return faces, normals, {"reoriented": turned, "inward": inward}
+    normals = unit_rows(mesh.normals)
+    faces = _turned(faces, _against(vertices, faces, normals))
+    lacking = np.zeros(len(vertices), bool)
+    lacking[faces.reshape(-1)] = True
+    lacking &= ~normals.any(axis=1)
+    if lacking.any():
+        computed = computed_normals(vertices, faces, first_equal_row(vertices), crease)
         normals[lacking] = computed[lacking]
-        return faces, normals, 0, int(lacking.sum())
-    place = first_equal_row(vertices)
-    faces, turned = _turned(faces, consistent_winding(vertices, faces, place))
-    return faces, computed_normals(vertices, faces, place, crease), turned, 0
+    return faces, normals, {"replaced-normal": lacking}
 
 
-def _turned(
-    faces: NDArray[np.uint32], over: NDArray[np.bool_]
-) -> tuple[NDArray[np.uint32], int]:
-    if not over.any():
-        return faces, 0
-    return np.where(over[:, None], faces[:, [0, 2, 1]], faces), int(over.sum())
+def _turned(faces: NDArray[np.uint32], over: NDArray[np.bool_]) -> NDArray[np.uint32]:
+    """Faces, with those marked wound the other way round."""
+    return np.where(over[:, None], faces[:, [0, 2, 1]], faces) if over.any() else faces
 
 
 def _first_asked(same_as: NDArray[np.int64], asked: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -136,15 +132,32 @@ def _against(
     return over
 
 
-@kernel
+def faces_without_area(vertices: FloatArray, faces: NDArray[np.uint32]) -> NDArray[np.bool_]:
+    """(F,) whether the corners of a face lie on one line, or on one point."""
+    flat = np.zeros(len(faces), bool)
+    _find_flat(vertices, faces, flat)
+    return flat
+
+
+@tight_kernel
+def _find_flat(vertices, faces, flat):  # type: ignore[no-untyped-def]
+    for f in range(len(faces)):
+        a = row(vertices, faces[f, 0])
+        u, v = minus(row(vertices, faces[f, 1]), a), minus(row(vertices, faces[f, 2]), a)
+        size = max(abs(u[0]), abs(u[1]), abs(u[2]), abs(v[0]), abs(v[1]), abs(v[2]))
+        if not size > 0.0:
+            flat[f] = True
+            continue
+        n = cross((u[0] / size, u[1] / size, u[2] / size), (v[0] / size, v[1] / size, v[2] / size))
+        flat[f] = not length(n) > 0.0
+
+
+@tight_kernel
 def _look_against(vertices, faces, normals, over):  # type: ignore[no-untyped-def]
     for f in range(len(faces)):
-        a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-        u0, u1, u2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        v0, v1, v2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-        n0, n1, n2 = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
+        a = row(vertices, faces[f, 0])
+        front = cross(minus(row(vertices, faces[f, 1]), a), minus(row(vertices, faces[f, 2]), a))
         along = 0.0
         for k in range(3):
-            n = normals[faces[f, k]]
-            along += n0 * n[0] + n1 * n[1] + n2 * n[2]
+            along += dot(front, row(normals, faces[f, k]))
         over[f] = along < 0.0

@@ -26,9 +26,13 @@ FaceArray = NDArray[np.uint32]
 
 MOST_SAMPLED = 1 << 16  # vertices of one part that the middle is taken from
 FINEST = 8192.0  # an edge may be this many times as long as the detail beside it: AO errs by 1e-4
-NEAR = 3.0  # or this many times as long as its distance from detail: an equilateral triangle's is 0.29
+NEAR = (
+    3.0  # or this many times as long as its distance from detail: an equilateral triangle's is 0.29
+)
 COARSER = 8.0  # ratio between the sizes of detail that are told apart
-RESOLVED = 2.0**-16  # detail finer than this share of its coordinate is lost in float32 all the same
+RESOLVED = (
+    2.0**-16
+)  # detail finer than this share of its coordinate is lost in float32 all the same
 SHORTER = 0.9  # of the length that can stay whole, so that what was cut is not cut again
 NEEDLE = 0.2  # shortest against longest edge
 ROUNDS = 64  # halvings; 2^64 is more than float64 can tell apart
@@ -59,7 +63,10 @@ def unit_frame(parts: Sequence[FloatArray]) -> UnitFrame:
     sampled = [part[:: max(1, len(part) // MOST_SAMPLED)] for part in filled]
     center = np.median(np.concatenate(sampled), axis=0)
     reach = max(
-        max(float(np.abs(part.max(axis=0) - center).max()), float(np.abs(part.min(axis=0) - center).max()))
+        max(
+            float(np.abs(part.max(axis=0) - center).max()),
+            float(np.abs(part.min(axis=0) - center).max()),
+        )
         for part in filled
     )
     if not (reach > 0.0 and math.isfinite(reach)):
@@ -94,7 +101,10 @@ def shorten(vertices, faces, shortest):  # type: ignore[no-untyped-def]
 
 
 def split_long_edges(
-    vertices: FloatArray, faces: FaceArray, details: Sequence[FloatArray], sizes: Sequence[FloatArray]
+    vertices: FloatArray,
+    faces: FaceArray,
+    details: Sequence[FloatArray],
+    sizes: Sequence[FloatArray],
 ) -> tuple[FloatArray, FaceArray]:
     """Split the triangles that are too large for the detail beside them, in float64.
 
@@ -133,7 +143,11 @@ def split_long_edges(
         cut_edges = where > 0.0
         added = np.full(len(edges), -1, np.int64)
         added[cut_edges] = len(vertices) + np.arange(int(cut_edges.sum()))
-        a, b, t = vertices[edges[cut_edges, 0]], vertices[edges[cut_edges, 1]], where[cut_edges, None]
+        a, b, t = (
+            vertices[edges[cut_edges, 0]],
+            vertices[edges[cut_edges, 1]],
+            where[cut_edges, None],
+        )
         vertices = np.concatenate([vertices, (1.0 - t) * a + t * b])
         cut = added[of_face]
         whole = (cut < 0).all(axis=1)

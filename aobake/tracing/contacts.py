@@ -20,14 +20,29 @@ from numpy.typing import NDArray
 from aobake.tracing.compiled import aligned, callback, inlined
 from aobake.tracing.vectors import cross, dot, length, minus, row
 
-__all__ = ["MOST_TOUCHING", "Touching", "new_touching", "note_triangle", "query_buffers", "touching"]
+__all__ = [
+    "MOST_TOUCHING",
+    "Touching",
+    "new_touching",
+    "note_triangle",
+    "query_buffers",
+    "touching",
+]
 
-CANDIDATES = 1024  # triangles noted for one ball; what a fan of more needles adds changes no decision
+CANDIDATES = (
+    1024  # triangles noted for one ball; what a fan of more needles adds changes no decision
+)
 MOST_TOUCHING = 128  # triangles weighed at one point
 NO_INSTANCE = 0xFFFFFFFF
 QUERY_FLOATS, CONTEXT_WORDS = 16, 48  # RTCPointQuery and RTCPointQueryContext, with room to spare
-CONTEXT_INSTANCE = 32  # its instID, behind two 4x4 matrices; Embree resets it when it leaves an instance
-ARGUMENT_USER, ARGUMENT_PRIMITIVE, ARGUMENT_CONTEXT = 1, 2, 3  # 8-byte fields of the callback's arguments
+CONTEXT_INSTANCE = (
+    32  # its instID, behind two 4x4 matrices; Embree resets it when it leaves an instance
+)
+ARGUMENT_USER, ARGUMENT_PRIMITIVE, ARGUMENT_CONTEXT = (
+    1,
+    2,
+    3,
+)  # 8-byte fields of the callback's arguments
 
 
 @intrinsic

@@ -232,9 +232,13 @@ def _library_path() -> Path:
     if sys.platform != "win32":
         return Path(module.origin)
     files = importlib.metadata.files("embreex") or []
-    found = [file for file in files if file.name.lower().startswith("embree4") and file.suffix == ".dll"]
+    found = [
+        file for file in files if file.name.lower().startswith("embree4") and file.suffix == ".dll"
+    ]
     if not found:
-        raise EngineError("embreex is installed without embree4.dll. Reinstall it: pip install embreex.")
+        raise EngineError(
+            "embreex is installed without embree4.dll. Reinstall it: pip install embreex."
+        )
     return Path(str(found[0].locate()))
 
 

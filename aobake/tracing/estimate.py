@@ -45,7 +45,9 @@ SPREAD = 0.09
 UNSEEN = 0.55
 FIRST_ROUND = 64  # rays of the first round towards a tolerance
 SMALLEST_ROUND = 16
-BLOCK_RAYS = 1 << 18  # about 40 ms of one thread: often enough to stop promptly, seldom enough to cost nothing
+BLOCK_RAYS = (
+    1 << 18
+)  # about 40 ms of one thread: often enough to stop promptly, seldom enough to cost nothing
 MOST_POINTS = 4096
 POLL_SECONDS = 0.1
 
@@ -91,7 +93,9 @@ def estimate(
     )
     rays = settings.rays if settings.tolerance is None else settings.max_rays
     step = max(1, min(MOST_POINTS, BLOCK_RAYS // rays))
-    _block(world, request, settings, slice(0, 0), result)  # compiles here, where it can be interrupted
+    _block(
+        world, request, settings, slice(0, 0), result
+    )  # compiles here, where it can be interrupted
     stop = threading.Event()
 
     def work(block: slice) -> int:
@@ -147,7 +151,11 @@ def _block(
     result.states[block] = states
     seen = np.flatnonzero(states != ENCLOSED)
     mean, error, rays = _rounds(world, request, settings, block, origins, seen)
-    for values, filled in ((result.mean, mean), (result.standard_error, error), (result.rays, rays)):
+    for values, filled in (
+        (result.mean, mean),
+        (result.standard_error, error),
+        (result.rays, rays),
+    ):
         values[block] = 0
         values[block][seen] = filled
 
@@ -168,7 +176,9 @@ def _rounds(
     count = len(points)
     total, weight = np.zeros(count), np.zeros(count)
     variance, rays = np.zeros(count), np.zeros(count, np.int64)
-    wanted = np.full(count, settings.rays if settings.tolerance is None else min(FIRST_ROUND, settings.max_rays))
+    wanted = np.full(
+        count, settings.rays if settings.tolerance is None else min(FIRST_ROUND, settings.max_rays)
+    )
     number = 0
     while (wanted > 0).any():
         for size in np.unique(wanted[wanted > 0]).tolist():
@@ -183,7 +193,9 @@ def _rounds(
         number += 1
         if settings.tolerance is None:
             break
-        wanted = _next_round(np.sqrt(variance) / weight, rays, settings.tolerance, settings.max_rays)
+        wanted = _next_round(
+            np.sqrt(variance) / weight, rays, settings.tolerance, settings.max_rays
+        )
     return total / np.maximum(weight, 1.0), np.sqrt(variance) / np.maximum(weight, 1.0), rays
 
 

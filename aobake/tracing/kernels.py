@@ -153,7 +153,9 @@ def openness(reached, far, falloff):  # type: ignore[no-untyped-def]
     return u if falloff == LINEAR else u * u * (3.0 - 2.0 * u)
 
 
-def scratch() -> tuple[NDArray[np.generic], NDArray[np.generic], NDArray[np.generic], NDArray[np.float32]]:
+def scratch() -> tuple[
+    NDArray[np.generic], NDArray[np.generic], NDArray[np.generic], NDArray[np.float32]
+]:
     """Memory for trace, of one thread: a packet, its words, two masks, a frame."""
     packet = aligned(RAY_HIT_FLOATS, np.float32)
     return packet, packet.view(np.int32), aligned(16, np.int32), np.zeros((3, 3), np.float32)
@@ -161,7 +163,20 @@ def scratch() -> tuple[NDArray[np.generic], NDArray[np.generic], NDArray[np.gene
 
 @tight_kernel
 def trace(  # type: ignore[no-untyped-def]
-    functions, scene, origins, normals, geometric, numbers, seed, sets, rays, far, ground, falloff, scratch, out
+    functions,
+    scene,
+    origins,
+    normals,
+    geometric,
+    numbers,
+    seed,
+    sets,
+    rays,
+    far,
+    ground,
+    falloff,
+    scratch,
+    out,
 ):
     """Trace `rays` directions from each point and add up how open they are.
 
@@ -190,7 +205,9 @@ def trace(  # type: ignore[no-untyped-def]
         before = -1.0
         for number in range(len(chosen)):
             aim(packet, chosen[number], frame, far)
-            choose(counts, packet, rays - 8 * number, None if geometric is None else geometric[point])
+            choose(
+                counts, packet, rays - 8 * number, None if geometric is None else geometric[point]
+            )
             for k in range(8):
                 valid[k] = counts[k]
             if ground is not None:

@@ -25,9 +25,9 @@ from aobake.tracing.compiled import inlined, tight_kernel
 from aobake.tracing.contacts import MOST_TOUCHING, new_touching, query_buffers, touching
 from aobake.tracing.vectors import cross, dot, length, minus, row
 
-__all__ = ["DOUBTFUL", "ENCLOSED", "PLAIN", "TOUCHING", "place_origins", "scratch"]
+__all__ = ["CONTACT", "DOUBTFUL", "ENCLOSED", "PLAIN", "THIN", "place_origins", "scratch"]
 
-PLAIN, TOUCHING, DOUBTFUL, ENCLOSED = 0, 1, 2, 3  # what was found about a point
+PLAIN, CONTACT, THIN, DOUBTFUL, ENCLOSED = 0, 1, 2, 3, 4  # what was found about a point
 
 ULP = 2.0**-23  # of a float32 in [1, 2); half of it below
 SEARCH_ULPS = 32.0  # radius of what counts as touching, in ulps of the point's largest coordinate
@@ -111,7 +111,8 @@ def take_sides(near, normal, step, margin, sides):  # type: ignore[no-untyped-de
     """Fill sides (K,) with 1 or -1, the side of each triangle that the point is seen from; 0: no matter.
 
     The point's own triangles are those whose front looks along its normal; those that lie face to face
-    on others are hidden and have no say. Returns whether all of its own are hidden.
+    on others are hidden and have no say. Returns PLAIN, CONTACT where some of them are hidden, or
+    ENCLOSED where all of its own are.
     """
     own, hidden = 0, 0
     for i in range(near.count):
@@ -129,7 +130,7 @@ def take_sides(near, normal, step, margin, sides):  # type: ignore[no-untyped-de
     for j in range(near.count):
         if not dot(row(near.fronts, j), normal) > OWN:
             sides[j] = side_of(near, j, normal, step, margin, sides)
-    return enclosed
+    return ENCLOSED if enclosed else CONTACT if hidden > 0 else PLAIN
 
 
 @inlined
@@ -189,8 +190,9 @@ def place_origins(  # type: ignore[no-untyped-def]
     positions, normals : (P, 3) float64, in units of the tree; normals of length 1
     scratch : of scratch()
     origins : (P, 3) float32, filled
-    states : (P,) uint8, filled with PLAIN, TOUCHING (other surfaces touch the point), DOUBTFUL (no side
-        is in front of all that touch) or ENCLOSED (the surface lies against another one: nothing is seen)
+    states : (P,) uint8, filled with PLAIN, CONTACT (the surface rests on another one there), THIN (a gap
+        is narrower than the rounding errors ask for), DOUBTFUL (no side is in front of all that touch)
+        or ENCLOSED (the surface lies against another one on all sides: nothing is seen)
     """
     buffers, near, sides = scratch
     ask = (functions[0], functions[1], scene)
@@ -200,7 +202,9 @@ def place_origins(  # type: ignore[no-untyped-def]
         radius = SEARCH_ULPS * ULP * largest
         near = touching(ask, world, point, radius, buffers, near)
         distance = ULP * (2.0 * largest + 3.0 * near.extent) + near.slack
-        if 4.0 * distance > radius:  # large triangles: what they cannot tell from the point touches it
+        if (
+            4.0 * distance > radius
+        ):  # large triangles: what they cannot tell from the point touches it
             radius = 4.0 * distance
             near = touching(ask, world, point, radius, buffers, near)
         states[p] = PLAIN
@@ -209,12 +213,14 @@ def place_origins(  # type: ignore[no-untyped-def]
             least = min(least, dot(normal, row(near.fronts, j)))
         if least < ORDINARY:
             rounding = 2.0 * ULP * largest + near.slack
-            states[p] = TOUCHING if least < OWN else PLAIN
-            if take_sides(near, normal, radius, rounding, sides):
-                states[p] = ENCLOSED
+            states[p] = take_sides(near, normal, radius, rounding, sides)
             direction, least = direction_in_front(near, normal, sides)
             if least < 0.0:
                 states[p] = max(states[p], DOUBTFUL)
-            distance = room_ahead(near, direction, distance / max(least, 0.1), rounding)
+            wanted = distance / max(least, 0.1)
+            room = room_ahead(near, direction, wanted, rounding)
+            if room < distance:
+                states[p] = max(states[p], THIN)
+            distance = room
         for i in range(3):
             origins[p, i] = point[i] + distance * direction[i]

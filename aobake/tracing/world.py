@@ -121,7 +121,10 @@ def _fixed_bodies(
 ) -> list[_Body]:
     """One body per filter, of all that stands where it is, with large triangles split."""
     placed = [frame.apply(_place(p.transform, parts[p.part].vertices)) for p in [*fixed, *moving]]
-    sizes = [shortest_edges(at, parts[p.part].faces) for at, p in zip(placed, [*fixed, *moving], strict=True)]
+    sizes = [
+        shortest_edges(at, parts[p.part].faces)
+        for at, p in zip(placed, [*fixed, *moving], strict=True)
+    ]
     details = [at[np.isfinite(size)] for at, size in zip(placed, sizes, strict=True)]
     fine = [size[np.isfinite(size)] for size in sizes]
     bodies = []
@@ -142,7 +145,10 @@ def _joined(arrays: list[NDArray]) -> NDArray:
 
 
 def _instances(
-    moving: Sequence[Placement], kept: Sequence[int], frames: Mapping[int, UnitFrame], frame: UnitFrame
+    moving: Sequence[Placement],
+    kept: Sequence[int],
+    frames: Mapping[int, UnitFrame],
+    frame: UnitFrame,
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
     """Which kept body each instance is, its (3, 4) transform from that body's frame, its slack."""
     matrices = np.empty((len(moving), 3, 4))

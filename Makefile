@@ -1,0 +1,54 @@
+# make demo    set up, then bake the showpiece scene into ./aobake-demo
+# make test    set up, then run the tests
+# make install set up only: everything goes into ./.venv, nothing outside of it is touched
+# make check   format, lint, strict types, tests
+# make bench   the measurements that the documents quote
+#
+# PYTHON=python3.12 chooses an interpreter, VENV=folder another place.
+
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_REQUIRE_VIRTUALENV := 1
+unexport PIP_USER PYTHONHOME PYTHONPATH
+
+.DELETE_ON_ERROR:
+.PHONY: demo test install check lint bench clean
+
+demo: install
+	@$(BIN)/aobake demo -o aobake-demo --force
+
+test: install
+	@$(BIN)/python -m pytest
+
+install: $(STAMP)
+
+check: lint test
+
+lint: install
+	@$(BIN)/ruff format --check --quiet . || { \
+	    echo "Some files are not formatted as agreed: $(BIN)/ruff format ." >&2; exit 1; }
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/mypy
+
+bench: install
+	@for benchmark in benchmarks/*.py; do $(BIN)/python "$$benchmark" || exit 1; done
+
+clean:
+	rm -rf "$(VENV)" aobake-demo build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+
+# The stamp is written last, so that an interrupted set-up is taken up again.
+$(STAMP): pyproject.toml
+	@command -v "$(PYTHON)" >/dev/null || { \
+	    echo "aobake: there is no $(PYTHON) here. Install Python 3.11 to 3.13, or name it: make PYTHON=python3.12" >&2; exit 1; }
+	@"$(PYTHON)" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || { \
+	    echo "aobake: Python 3.11 to 3.13 is needed, and $(PYTHON) is `$(PYTHON) -V 2>&1`. Name another: make PYTHON=python3.12" >&2; exit 1; }
+	@"$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null || { \
+	    echo "aobake: $(PYTHON) comes without its venv module. On Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
+	@test ! -e "$(VENV)/pyvenv.cfg" || "$(BIN)/python" -m pip --version >/dev/null 2>&1 || rm -rf "$(VENV)"
+	@test -e "$(VENV)/pyvenv.cfg" || { echo "aobake: setting up $(VENV)"; "$(PYTHON)" -m venv "$(VENV)"; }
+	@"$(BIN)/python" -m pip install --quiet --editable ".[all,dev]"
+	@touch "$@"

@@ -1,0 +1,102 @@
+"""What is shown: lines, the progress bar, tables. The one file that imports rich, and only to draw."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+__all__ = ["Progress", "Section", "error", "progress_bar", "reset", "say", "tables", "warn"]
+
+Progress = Callable[[str, int, int], None]
+"""Called with the stage, what is done of it, and all there is to do."""
+
+Section = tuple[str, Mapping[str, str]]
+"""A title, and what is said under it: name -> value."""
+
+MOST_WARNINGS = 10
+
+
+def error(message: str) -> None:
+    """One line on stderr that says why nothing came of it."""
+    _to_stderr("error", message)
+
+
+def warn(messages: Sequence[str], more: str) -> None:
+    """One line on stderr for each warning; of many, the first ones and how many more, and where they are."""
+    shown = messages if len(messages) <= MOST_WARNINGS else messages[: MOST_WARNINGS - 1]
+    for message in shown:
+        _to_stderr("warning", message)
+    if len(shown) < len(messages):
+        _to_stderr("warning", f"and {len(messages) - len(shown)} more{more}.")
+
+
+def say(*lines: str) -> None:
+    """Lines on stdout."""
+    sys.stdout.write("".join(f"{line}\n" for line in lines))
+
+
+@contextlib.contextmanager
+def progress_bar(*, quiet: bool) -> Iterator[Progress | None]:
+    """A bar on stderr that vanishes when it is done; None where nobody would see it."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
+
+    columns = (
+        TextColumn("{task.description:8}"),
+        BarColumn(bar_width=None),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+    )
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+        tasks = {}
+
+        def advance(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage)
+            bars.update(tasks[stage], completed=done, total=total)
+
+        yield advance
+
+
+def tables(sections: Sequence[Section]) -> None:
+    """Names and values on stdout: as tables on a terminal, else as `title.name: value`, one a line."""
+    if not sys.stdout.isatty():
+        for title, rows in sections:
+            say(*(f"{title}.{name}: {_one_line(value)}" for name, value in rows.items()))
+        return
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    console = Console()
+    for title, rows in sections:
+        table = Table(title=Text(title), title_justify="left", show_header=False, box=None)
+        table.add_column(style="bold", no_wrap=True)
+        table.add_column(overflow="fold")
+        for name, value in rows.items():
+            table.add_row(Text(name), Text(value))
+        console.print(table)
+        console.print()
+
+
+def reset() -> None:
+    """Take back what a bar has done to the terminal, for a process that ends without leaving it."""
+    with contextlib.suppress(OSError, ValueError):
+        if sys.stderr.isatty():
+            sys.stderr.write("\r\x1b[2K\x1b[?25h")  # an empty line, and the cursor shown
+
+
+def _to_stderr(kind: str, message: str) -> None:
+    # A closed stderr must not turn one problem into two.
+    with contextlib.suppress(OSError, ValueError):
+        sys.stderr.write(f"aobake: {kind}: {_one_line(message)}\n")
+        sys.stderr.flush()
+
+
+def _one_line(message: str) -> str:
+    return " ".join(message.splitlines())

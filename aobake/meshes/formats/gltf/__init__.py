@@ -1,0 +1,8 @@
+"""glTF 2.0 and GLB: read with every value as it is stored, written by editing the document."""
+
+from __future__ import annotations
+
+from aobake.meshes.formats.gltf.read import read
+from aobake.meshes.formats.gltf.write import check, write
+
+__all__ = ["check", "read", "write"]

@@ -1,0 +1,31 @@
+"""Ambient occlusion as an attribute of its own, _AO: for programs that look for it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aobake.meshes.formats.gltf.edit import Edit
+from aobake.meshes.formats.gltf.stores import Place
+
+__all__ = ["AttributeStore"]
+
+
+class AttributeStore:
+    """_AO, a float for each vertex; one that is there already is replaced."""
+
+    normalized = False
+
+    def check(self, place: Place) -> None:
+        """Every primitive can hold it."""
+
+    def column(self, place: Place, ao: NDArray[np.float32]) -> NDArray[np.generic]:  # noqa: ARG002
+        """(V, 1) float32."""
+        return ao.reshape(-1, 1)
+
+    def attribute(self, place: Place) -> str:  # noqa: ARG002
+        """_AO: names of applications begin with an underscore."""
+        return "_AO"
+
+    def finish(self, edit: Edit, places: dict[tuple[int, int], Place]) -> None:
+        """Nothing else changes."""

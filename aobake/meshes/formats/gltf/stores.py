@@ -1,0 +1,46 @@
+"""The ways to keep ambient occlusion in a primitive, behind one interface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aobake.meshes.formats.gltf.edit import Edit
+from aobake.meshes.formats.gltf.element import Element
+from aobake.meshes.formats.gltf.geometry import PrimitiveReader
+
+__all__ = ["Place", "Store"]
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A primitive that is to hold ambient occlusion.
+
+    label : 'mesh 3 "wheel" primitive 0', for messages
+    """
+
+    reader: PrimitiveReader
+    primitive: Element
+    label: str
+
+
+class Store(Protocol):
+    """One way to keep ambient occlusion."""
+
+    normalized: bool
+    """Whether the whole numbers of a column stand for [0, 1]."""
+
+    def check(self, place: Place) -> None:
+        """Raise OutputError where the primitive cannot hold it."""
+
+    def column(self, place: Place, ao: NDArray[np.float32]) -> NDArray[np.generic]:
+        """(V, components) as stored, of (V,) values in [0, 1]."""
+
+    def attribute(self, place: Place) -> str:
+        """The name of the attribute that holds the column."""
+
+    def finish(self, edit: Edit, places: dict[tuple[int, int], Place]) -> None:
+        """What is to be changed beyond the attributes; places: (mesh, primitive) of the new JSON -> its place."""

@@ -1,0 +1,52 @@
+"""Ambient occlusion into a PLY file, and every byte that is not concerned as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aobake.errors import OutputError
+from aobake.files import write_files
+from aobake.meshes.formats.merged import merged
+from aobake.meshes.formats.ply.fresh import document
+from aobake.meshes.formats.ply.patching import patched
+from aobake.meshes.formats.ply.source import PlySource
+from aobake.meshes.scene import Scene
+from aobake.settings import StoreSettings
+
+__all__ = ["check", "write"]
+
+
+def check(scene: Scene, store: StoreSettings) -> None:  # noqa: ARG001 - Writer
+    """Raise OutputError for a store that PLY has no place for."""
+    if store.store == "occlusion":
+        raise OutputError(
+            'PLY has no occlusion texture, which store "occlusion" needs. '
+            "Use --store color or --store attribute, or write GLB (-o NAME.glb)."
+        )
+
+
+def write(
+    scene: Scene, ao: Sequence[NDArray[np.float32]], target: Path, store: StoreSettings
+) -> tuple[Path, ...]:
+    """Write the scene's PLY file with ambient occlusion, or a new one where it was read from no PLY file.
+
+    ao : one (V_i,) float32 array per instance
+    store : "color" gives red, green, blue and ao; "attribute" gives ao alone
+    Returns the target. Raises OutputError; nothing is half-written.
+    """
+    check(scene, store)
+    if not isinstance(scene.source, PlySource):
+        write_files({target: document(merged(scene, ao), store)})
+        return (target,)
+    if len(ao) != 1:
+        raise OutputError(
+            f"{target}: a PLY file is one mesh, and there are values for {len(ao)}. Write GLB."
+        )
+    write_files(
+        {target: patched(scene.source.data, scene.source.header, ao[0], store, str(target))}
+    )
+    return (target,)

@@ -1,0 +1,159 @@
+"""What was done, as data and as JSON. The keys are explained in docs/report.md, and stay."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aobake import environment, files
+from aobake.errors import InputError
+from aobake.plan import Plan
+from aobake.results import BakedVertices
+from aobake.settings import StoreSettings
+
+__all__ = ["SCHEMA", "ErrorSummary", "FileRecord", "Report", "digests", "of_vertices"]
+
+SCHEMA = 1  # grows when a key changes its meaning or goes; new keys do not change it
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileRecord:
+    """A file that was read or written: its path as given, and the digest of its content."""
+
+    path: str
+    sha256: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorSummary:
+    """The standard error over all points that were traced; None throughout where there were none."""
+
+    rms: float | None
+    p50: float | None
+    p99: float | None
+    max: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """One bake.
+
+    settings : of the bake and of how it is stored; settings_file : the file that some came from
+    points : points that were given a value
+    ao_mean : their mean, or None where there are none
+    seconds : stage -> seconds; rays : rays traced; mrays_per_s : million rays per second of tracing
+    """
+
+    schema: int
+    version: str
+    command: str
+    inputs: tuple[FileRecord, ...]
+    outputs: tuple[FileRecord, ...]
+    settings: Mapping[str, object]
+    settings_file: str | None
+    plan: Plan
+    instances: int
+    triangles: int
+    points: int
+    ao_mean: float | None
+    seconds: Mapping[str, float]
+    rays: int
+    mrays_per_s: float | None
+    error: ErrorSummary
+    warnings: tuple[str, ...]
+    versions: Mapping[str, str]
+    machine: str
+    processors: int
+
+    def to_json(self) -> str:
+        """The report as JSON, keys in the order of the fields, ending with a line break."""
+        data = dataclasses.asdict(dataclasses.replace(self, plan=Plan(dict(self.plan.effects))))
+        data["seconds"] = {stage: round(spent, 6) for stage, spent in self.seconds.items()}
+        return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def write(self, path: Path) -> None:
+        """Write the JSON to a file that appears whole or not at all. Raises OutputError."""
+        files.write_files({path: self.to_json().encode("utf-8", "backslashreplace")})
+
+
+def of_vertices(
+    baked: BakedVertices,
+    *,
+    command: str,
+    inputs: Sequence[FileRecord],
+    outputs: Sequence[FileRecord],
+    store: StoreSettings,
+    settings_file: Path | None = None,
+    seconds: Mapping[str, float] | None = None,
+    warnings: Sequence[str] = (),
+) -> Report:
+    """The report of a vertex bake.
+
+    seconds : stages that the bake itself knows nothing of, such as 'read' and 'write'
+    warnings : what to say besides the bake's own warnings and the scene's
+    """
+    values = _joined(baked.ao)
+    all_seconds = dict(baked.seconds) | dict(seconds or {})
+    traced_s = all_seconds.get("trace", 0.0)
+    here = environment.versions()
+    return Report(
+        schema=SCHEMA,
+        version=here["aobake"],
+        command=command,
+        inputs=tuple(inputs),
+        outputs=tuple(outputs),
+        settings=dataclasses.asdict(baked.settings) | dataclasses.asdict(store),
+        settings_file=None if settings_file is None else str(settings_file),
+        plan=baked.plan,
+        instances=len(baked.scene.instances),
+        triangles=baked.scene.triangles,
+        points=len(values),
+        ao_mean=float(values.mean(dtype=np.float64)) if len(values) else None,
+        seconds={stage: all_seconds[stage] for stage in _in_order(all_seconds)},
+        rays=baked.rays,
+        mrays_per_s=baked.rays / traced_s / 1e6 if traced_s > 0.0 else None,
+        error=error_summary(_joined(baked.standard_error)),
+        warnings=tuple(dict.fromkeys((*baked.scene.warnings, *baked.warnings, *warnings))),
+        versions=here,
+        machine=environment.machine(),
+        processors=environment.processors(),
+    )
+
+
+def error_summary(standard_error: NDArray[np.float32]) -> ErrorSummary:
+    """Root mean square, median, 99th percentile and maximum over the points that were traced.
+
+    standard_error : (P,) float32; 0 marks a point where nothing was estimated
+    """
+    traced = standard_error[standard_error > 0.0].astype(np.float64)
+    if not len(traced):
+        return ErrorSummary(rms=None, p50=None, p99=None, max=None)
+    p50, p99 = np.percentile(traced, (50, 99))
+    rms = float(np.sqrt(np.mean(traced**2)))
+    return ErrorSummary(rms=rms, p50=float(p50), p99=float(p99), max=float(traced.max()))
+
+
+def digests(paths: Sequence[Path]) -> tuple[FileRecord, ...]:
+    """A record of each file. Raises InputError where one cannot be read."""
+    records = []
+    for path in paths:
+        try:
+            records.append(FileRecord(path=str(path), sha256=files.sha256(path)))
+        except OSError as error:
+            raise InputError(f"{path}: it cannot be read ({error.strerror or error}).") from error
+    return tuple(records)
+
+
+def _joined(arrays: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
+    return np.concatenate(arrays) if arrays else np.empty(0, np.float32)
+
+
+def _in_order(seconds: Mapping[str, float]) -> list[str]:
+    known = ["read", "prepare", "build", "trace", "write"]
+    return [stage for stage in known if stage in seconds] + [s for s in seconds if s not in known]

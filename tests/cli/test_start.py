@@ -1,0 +1,62 @@
+"""Starting up: help is quick because nothing heavy is imported for it, and it tells the truth."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import pytest
+
+import aobake
+from aobake import BakeSettings, StoreSettings
+from aobake.cli.app import COMMANDS
+from tests.conftest import Run
+from tests.support import modules_after, python
+
+HEAVY = {"numpy", "numba", "trimesh", "scipy", "DracoPy", "embreex", "llvmlite"}
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["vertex", "--help"], ["--version"], ["vertx"]])
+def test_what_needs_no_bake_imports_nothing_heavy(arguments: list[str]) -> None:
+    code = [
+        "import contextlib, io, aobake.cli",
+        "with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):",
+        f"    aobake.cli.main({arguments!r})",
+    ]
+    loaded = modules_after(code)
+    assert "cyclopts" in loaded
+    assert not loaded & HEAVY
+
+
+def test_every_command_is_in_the_help_with_what_it_does(run: Run) -> None:
+    ran = run("--help")
+    assert ran.status == 0
+    assert ran.err == ""
+    for command in COMMANDS:
+        assert re.search(rf"\b{command}\s+[A-Z]\w+ ", ran.out), command
+
+
+@pytest.mark.parametrize("kind", [BakeSettings, StoreSettings])
+def test_the_help_shows_every_setting_with_its_default(
+    run: Run, kind: type[BakeSettings | StoreSettings], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    text = run("vertex", "--help").out
+    for field in dataclasses.fields(kind):
+        line = next(
+            part for part in text.split("\n") if f"--{field.name.replace('_', '-')} " in part
+        )
+        assert len(line.split()) > 4, "a flag explains itself"
+        if field.default is not None:
+            assert f"[default: {field.default}]" in line
+        assert "None" not in line
+
+
+def test_help_fits_into_80_columns() -> None:
+    done = python("-m", "aobake", "vertex", "--help")
+    assert done.returncode == 0
+    assert max(map(len, done.stdout.splitlines())) <= 80
+
+
+def test_the_version_is_that_of_the_package(run: Run) -> None:
+    assert run("--version").out == f"{aobake.__version__}\n"

@@ -1,0 +1,466 @@
+"""Writing: only what must change changes, and every viewer finds it."""
+
+from __future__ import annotations
+
+import copy
+import json
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from aobake.errors import OutputError
+from aobake.meshes.formats import gltf
+from aobake.meshes.formats.gltf.gradient import HEIGHT, WIDTH, coordinate, gradient_png
+from aobake.settings import Store, StoreSettings
+from tests.meshes.formats.gltf.build import (
+    Builder,
+    attribute,
+    bake,
+    load,
+    ramp,
+    square_builder,
+    unpack_glb,
+)
+
+STORES: tuple[Store, ...] = ("color", "occlusion", "attribute")
+
+
+def constant(*values: float) -> list[NDArray[np.float32]]:
+    """One value for all vertices of each instance, which is a square."""
+    return [np.full(4, value, np.float32) for value in values]
+
+
+def without_additions(document: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
+    """The document as it was, if a bake only added to it."""
+    found = copy.deepcopy(document)
+    for name in (
+        "accessors",
+        "bufferViews",
+        "materials",
+        "meshes",
+        "images",
+        "samplers",
+        "textures",
+    ):
+        if name in before:
+            found[name] = found[name][: len(before[name])]
+        else:
+            found.pop(name, None)
+    for mesh, old in zip(found["meshes"], before["meshes"], strict=True):
+        for primitive, was in zip(mesh["primitives"], old["primitives"], strict=True):
+            primitive["attributes"] = {
+                k: v for k, v in primitive["attributes"].items() if k in was["attributes"]
+            }
+            if "material" not in was:
+                primitive.pop("material", None)
+    found["buffers"][0]["byteLength"] = before["buffers"][0]["byteLength"]
+    return found
+
+
+@pytest.mark.parametrize("store", STORES)
+def test_a_bake_adds_to_a_glb_and_changes_nothing_else(tmp_path: Path, store: Store) -> None:
+    builder = square_builder(extras={"a": [1, 2.5, None]})
+    builder.json["extras"] = {"b": "c"}
+    source = builder.glb(tmp_path / "a.glb")
+    kept = source.read_bytes()
+    bake(source, tmp_path / "b.glb", store)
+    before, binary, _ = unpack_glb(source)
+    after, grown, _ = unpack_glb(tmp_path / "b.glb")
+    assert without_additions(after, before) == before
+    assert list(after)[: len(before)] == list(before)
+    assert grown.startswith(binary)
+    assert after["buffers"][0]["byteLength"] == len(grown)
+    assert source.read_bytes() == kept
+
+
+@pytest.mark.parametrize("store", STORES)
+def test_the_same_input_gives_the_same_bytes(tmp_path: Path, store: Store) -> None:
+    source = square_builder().glb(tmp_path / "a.glb")
+    for name in ("b.glb", "c.glb"):
+        bake(source, tmp_path / name, store)
+    assert (tmp_path / "b.glb").read_bytes() == (tmp_path / "c.glb").read_bytes()
+
+
+def test_new_colours_are_grey_in_16_bits_with_full_alpha(tmp_path: Path) -> None:
+    source = square_builder().glb(tmp_path / "a.glb")
+    values = np.array([0.0, 0.25, 0.5, 1.0], np.float32)
+    bake(source, tmp_path / "b.glb", ao=[values])
+    found = attribute(tmp_path / "b.glb", "COLOR_0")
+    assert found.dtype == np.uint16
+    np.testing.assert_array_equal(found, [[v, v, v, 65535] for v in (0, 16384, 32768, 65535)])
+    after = unpack_glb(tmp_path / "b.glb")[0]
+    assert after["accessors"][-1]["normalized"] is True
+    assert after["bufferViews"][-1]["byteStride"] == 8
+
+
+@pytest.mark.parametrize("width", [3, 4])
+@pytest.mark.parametrize(("dtype", "full"), [("u1", 255), ("u2", 65535), ("f4", 1.0)])
+def test_existing_colours_are_multiplied_and_alpha_is_kept(
+    tmp_path: Path, dtype: str, full: float, width: int
+) -> None:
+    builder = Builder()
+    rng = np.random.default_rng(3)
+    stored = rng.random((4, width)) * full
+    number = builder.accessor(stored, dtype, **({} if dtype == "f4" else {"normalized": True}))
+    builder.show(builder.node(mesh=builder.mesh(builder.primitive(attributes={"COLOR_0": number}))))
+    source = builder.glb(tmp_path / "a.glb")
+    before = attribute(source, "COLOR_0") / full
+    values = ramp(load(source))
+    bake(source, tmp_path / "b.glb", ao=values)
+    found = attribute(tmp_path / "b.glb", "COLOR_0")
+    assert found.dtype == (np.float32 if dtype == "f4" else np.uint16)
+    after = found / (1.0 if dtype == "f4" else 65535)
+    step = 1e-7 if dtype == "f4" else 0.51 / 65535
+    np.testing.assert_allclose(after[:, :3], before[:, :3] * values[0][:, None], rtol=0, atol=step)
+    if width == 4:
+        np.testing.assert_array_equal(after[:, 3], before[:, 3])
+    view = unpack_glb(tmp_path / "b.glb")[0]["bufferViews"][-1]
+    assert view["byteStride"] % 4 == 0
+    assert view["byteLength"] == 4 * view["byteStride"]
+
+
+def test_colours_that_are_no_colours_are_refused_before_the_bake(tmp_path: Path) -> None:
+    builder = Builder()
+    number = builder.accessor([[1, 2, 3]] * 4, "i2")
+    builder.show(builder.node(mesh=builder.mesh(builder.primitive(attributes={"COLOR_0": number}))))
+    scene = load(builder.glb(tmp_path / "a.glb"))
+    with pytest.raises(OutputError, match=r"COLOR_0 is int16.*--store attribute"):
+        gltf.check(scene, StoreSettings())
+    assert gltf.check(scene, StoreSettings(store="attribute")) == ()
+
+
+def test_colours_that_are_too_few_are_refused_before_the_bake(tmp_path: Path) -> None:
+    builder = Builder()
+    colors = {"COLOR_0": builder.accessor([[1, 1, 1]] * 3)}
+    builder.show(builder.node(mesh=builder.mesh(builder.primitive(attributes=colors))))
+    with pytest.raises(OutputError, match="COLOR_0 has 3 values for 4 vertices"):
+        gltf.check(load(builder.glb(tmp_path / "a.glb")), StoreSettings())
+
+
+def test_the_attribute_holds_the_values_exactly(tmp_path: Path) -> None:
+    source = square_builder().glb(tmp_path / "a.glb")
+    values = ramp(load(source))
+    bake(source, tmp_path / "b.glb", "attribute", values)
+    found = attribute(tmp_path / "b.glb", "_AO")
+    assert found.dtype == np.float32
+    np.testing.assert_array_equal(found[:, 0], values[0])
+
+
+def decoded_png(data: bytes) -> NDArray[np.uint8]:
+    """(H, W) of an 8-bit grey PNG without filters; checks the sums."""
+    assert data.startswith(b"\x89PNG\r\n\x1a\n")
+    at, parts = 8, {}
+    while at < len(data):
+        size, kind = struct.unpack_from(">I4s", data, at)
+        body = data[at + 8 : at + 8 + size]
+        assert struct.unpack_from(">I", data, at + 8 + size)[0] == zlib.crc32(kind + body)
+        parts[kind] = body
+        at += 12 + size
+    width, height, depth, color = struct.unpack_from(">IIBB", parts[b"IHDR"])
+    assert (depth, color) == (8, 0)
+    rows = np.frombuffer(zlib.decompress(parts[b"IDAT"]), np.uint8).reshape(height, width + 1)
+    assert not rows[:, 0].any()
+    return rows[:, 1:]
+
+
+def sampled(image: NDArray[np.uint8], u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A linear filter with edges clamped, of the first row."""
+    x = u * image.shape[1] - 0.5
+    low = np.floor(x)
+    row = image[0] / 255
+    at = [row[np.clip(low + k, 0, len(row) - 1).astype(int)] for k in (0, 1)]
+    return np.asarray(at[0] + (x - low) * (at[1] - at[0]))
+
+
+def test_the_gradient_gives_back_the_value_that_looks_it_up() -> None:
+    image = decoded_png(gradient_png())
+    assert image.shape == (HEIGHT, WIDTH)
+    values = np.linspace(0, 1, 1001, dtype=np.float32)
+    np.testing.assert_allclose(sampled(image, coordinate(values)), values, rtol=0, atol=1e-7)
+    np.testing.assert_array_equal(sampled(image, coordinate(np.array([0, 1], np.float32))), [0, 1])
+
+
+def test_an_occlusion_texture_shows_the_values_through_its_own_set(tmp_path: Path) -> None:
+    builder = Builder()
+    uv = builder.accessor([[0, 0]] * 4)
+    builder.put(
+        "materials",
+        {"name": "wood", "occlusionTexture": {"index": 0, "strength": 0.3, "texCoord": 0}},
+    )
+    builder.put("textures", {})
+    builder.show(
+        builder.node(
+            mesh=builder.mesh(builder.primitive(material=0, attributes={"TEXCOORD_0": uv}))
+        )
+    )
+    source = builder.glb(tmp_path / "a.glb")
+    values = ramp(load(source))
+    bake(source, tmp_path / "b.glb", "occlusion", values)
+    after, binary, _ = unpack_glb(tmp_path / "b.glb")
+    assert after["materials"] == [{"name": "wood", "occlusionTexture": {"index": 1, "texCoord": 1}}]
+    texture = after["textures"][1]
+    assert after["samplers"][texture["sampler"]] == {
+        "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071,
+    }  # fmt: skip
+    view = after["bufferViews"][after["images"][texture["source"]]["bufferView"]]
+    image = decoded_png(binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]])
+    found = attribute(tmp_path / "b.glb", "TEXCOORD_1") / 65535
+    # Half a step of 16 bits, stretched by 256 / 255.
+    np.testing.assert_allclose(sampled(image, found[:, 0]), values[0], rtol=0, atol=0.6 / 65535)
+    np.testing.assert_allclose(found[:, 1], 0.5, atol=1e-4)
+    warnings = gltf.check(load(source), StoreSettings(store="occlusion"))
+    assert len(warnings) == 1
+    assert 'material 0 "wood" has an occlusion texture, which is replaced' in warnings[0]
+
+
+def test_materials_are_copied_where_something_else_uses_them(tmp_path: Path) -> None:
+    """Points keep the original; two sets of coordinates need two copies; no material becomes a new one."""
+    builder = Builder()
+    builder.put("materials", {"name": "wood", "doubleSided": True})
+    uv = builder.accessor([[0, 0]] * 4)
+    parts = [
+        builder.primitive(material=0, mode=0),
+        builder.primitive(material=0),
+        builder.primitive(material=0, attributes={"TEXCOORD_0": uv}),
+        builder.primitive(),
+    ]
+    builder.show(builder.node(mesh=builder.mesh(*parts)))
+    bake(builder.glb(tmp_path / "a.glb"), tmp_path / "b.glb", "occlusion")
+    after = unpack_glb(tmp_path / "b.glb")[0]
+    named = [primitive["material"] for primitive in after["meshes"][0]["primitives"]]
+    wood = {"name": "wood_ao", "doubleSided": True}
+    assert named == [0, 1, 2, 3]
+    assert after["materials"] == [
+        {"name": "wood", "doubleSided": True},
+        {**wood, "occlusionTexture": {"index": 0}},
+        {**wood, "occlusionTexture": {"index": 0, "texCoord": 1}},
+        {"occlusionTexture": {"index": 0}},
+    ]
+    assert len(after["images"]) == len(after["textures"]) == len(after["samplers"]) == 1
+    assert "TEXCOORD_0" not in after["meshes"][0]["primitives"][0]["attributes"]
+
+
+def test_a_material_used_with_two_sets_serves_one_and_is_copied_for_the_other(
+    tmp_path: Path,
+) -> None:
+    builder = Builder()
+    builder.put("materials", {"name": "wood"})
+    uv = {"TEXCOORD_0": builder.accessor([[0, 0]] * 4)}
+    parts = [builder.primitive(material=0), builder.primitive(material=0, attributes=uv)]
+    builder.show(builder.node(mesh=builder.mesh(*parts)))
+    bake(builder.glb(tmp_path / "a.glb"), tmp_path / "b.glb", "occlusion")
+    assert unpack_glb(tmp_path / "b.glb")[0]["materials"] == [
+        {"name": "wood", "occlusionTexture": {"index": 0}},
+        {"name": "wood_ao", "occlusionTexture": {"index": 0, "texCoord": 1}},
+    ]
+
+
+def test_variants_point_at_materials_that_read_the_new_set(tmp_path: Path) -> None:
+    builder = Builder()
+    for name in ("red", "blue"):
+        builder.put("materials", {"name": name})
+    mappings = [{"material": 0, "variants": [0]}, {"material": 1, "variants": [1]}]
+    variants = {"KHR_materials_variants": {"mappings": mappings}}
+    parts = [
+        builder.primitive(material=0, extensions=variants),
+        builder.primitive(material=1, mode=1),
+    ]
+    builder.show(builder.node(mesh=builder.mesh(*parts)))
+    bake(builder.glb(tmp_path / "a.glb"), tmp_path / "b.glb", "occlusion")
+    after = unpack_glb(tmp_path / "b.glb")[0]
+    primitive = after["meshes"][0]["primitives"][0]
+    new = primitive["extensions"]["KHR_materials_variants"]["mappings"]
+    assert [mapping["variants"] for mapping in new] == [[0], [1]]
+    assert [after["materials"][mapping["material"]]["name"] for mapping in new] == [
+        "red",
+        "blue_ao",
+    ]
+    assert all("occlusionTexture" in after["materials"][mapping["material"]] for mapping in new)
+    assert "occlusionTexture" not in after["materials"][1]
+
+
+def test_a_primitive_with_eight_sets_of_coordinates_is_refused(tmp_path: Path) -> None:
+    builder = Builder()
+    sets = {f"TEXCOORD_{n}": builder.accessor([[0, 0]] * 4) for n in range(8)}
+    builder.show(builder.node(mesh=builder.mesh(builder.primitive(attributes=sets))))
+    scene = load(builder.glb(tmp_path / "a.glb"))
+    with pytest.raises(OutputError, match=r"8 texture coordinate sets already.*--store color"):
+        gltf.check(scene, StoreSettings(store="occlusion"))
+
+
+def three_nodes(tmp_path: Path, *, hidden: bool = False) -> Path:
+    builder = Builder()
+    mesh = builder.mesh(name="wheel")
+    nodes = [builder.node(mesh=mesh, translation=[x, 0, 0]) for x in range(3)]
+    return builder.show(*nodes[:2] if hidden else nodes).glb(tmp_path / "a.glb")
+
+
+@pytest.mark.parametrize("store", STORES)
+def test_nodes_that_share_a_mesh_get_copies_only_where_their_values_differ(
+    tmp_path: Path, store: Store
+) -> None:
+    bake(three_nodes(tmp_path), tmp_path / "b.glb", store, constant(0.5, 0.25, 0.5))
+    after = unpack_glb(tmp_path / "b.glb")[0]
+    assert [node["mesh"] for node in after["nodes"]] == [0, 1, 0]
+    first, second = after["meshes"]
+    assert first["name"] == "wheel"
+    assert second["name"].startswith("wheel_")
+    a, b = first["primitives"][0], second["primitives"][0]
+    different = {key for key in a["attributes"] if a["attributes"][key] != b["attributes"][key]}
+    assert len(different) == 1
+    assert a["indices"] == b["indices"]
+
+
+def test_nodes_with_equal_values_go_on_sharing(tmp_path: Path) -> None:
+    bake(three_nodes(tmp_path), tmp_path / "b.glb", ao=constant(0.5, 0.5, 0.5))
+    after = unpack_glb(tmp_path / "b.glb")[0]
+    assert (len(after["meshes"]), len(after["accessors"])) == (1, 3)
+
+
+def test_a_mesh_that_a_node_outside_of_the_scene_shows_stays_as_it_is(tmp_path: Path) -> None:
+    source = three_nodes(tmp_path, hidden=True)
+    bake(source, tmp_path / "b.glb", ao=constant(0.5, 0.5))
+    before, after = unpack_glb(source)[0], unpack_glb(tmp_path / "b.glb")[0]
+    assert [node["mesh"] for node in after["nodes"]] == [1, 1, 0]
+    assert after["meshes"][0] == before["meshes"][0]
+
+
+def test_gpu_instances_share_their_mean_and_say_so(tmp_path: Path) -> None:
+    builder = Builder()
+    translation = builder.accessor([[1, 0, 0], [2, 0, 0]])
+    extension = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": translation}}}
+    builder.show(builder.node(mesh=builder.mesh(), extensions=extension, name="grass"))
+    source = builder.glb(tmp_path / "a.glb")
+    bake(source, tmp_path / "b.glb", "attribute", constant(0.25, 0.75))
+    np.testing.assert_array_equal(attribute(tmp_path / "b.glb", "_AO"), [[0.5]] * 4)
+    (warning,) = gltf.check(load(source), StoreSettings())
+    assert '"grass"' in warning
+    assert "mean" in warning
+
+
+def shared_vertices(tmp_path: Path, *indices: list[int]) -> Path:
+    builder = Builder()
+    positions = builder.accessor(np.arange(18.0).reshape(6, 3))
+    parts = [
+        {"attributes": {"POSITION": positions}, "indices": builder.accessor(corner, "u2")}
+        for corner in indices
+    ]
+    builder.show(builder.node(mesh=builder.mesh(*parts)))
+    return builder.glb(tmp_path / "a.glb")
+
+
+def test_primitives_that_share_their_vertices_share_one_column(tmp_path: Path) -> None:
+    source = shared_vertices(tmp_path, [0, 1, 2], [3, 4, 5])
+    values = [np.full(6, value, np.float32) for value in (0.25, 0.75)]
+    bake(source, tmp_path / "b.glb", "attribute", values)
+    parts = unpack_glb(tmp_path / "b.glb")[0]["meshes"][0]["primitives"]
+    assert parts[0]["attributes"] == parts[1]["attributes"]
+    np.testing.assert_array_equal(
+        attribute(tmp_path / "b.glb", "_AO")[:, 0], [0.25] * 3 + [0.75] * 3
+    )
+
+
+def test_primitives_that_disagree_about_a_vertex_get_columns_of_their_own(tmp_path: Path) -> None:
+    source = shared_vertices(tmp_path, [0, 1, 2], [2, 3, 4])
+    values = [np.full(6, value, np.float32) for value in (0.25, 0.75)]
+    bake(source, tmp_path / "b.glb", "attribute", values)
+    for number, value in enumerate((0.25, 0.75)):
+        found = attribute(tmp_path / "b.glb", "_AO", primitive=number)
+        used = [0, 1, 2] if number == 0 else [2, 3, 4]
+        np.testing.assert_array_equal(found[used, 0], value)
+
+
+def test_values_of_another_scene_are_refused(tmp_path: Path) -> None:
+    scene = load(three_nodes(tmp_path))
+    for values, words in (
+        (constant(1.0), "values for 1 instances"),
+        ([*constant(1, 1), np.ones(3, np.float32)], "shape"),
+    ):
+        with pytest.raises(OutputError, match=words):
+            gltf.write(scene, values, tmp_path / "b.glb", StoreSettings())
+    assert not (tmp_path / "b.glb").exists()
+
+
+def test_values_that_are_no_numbers_count_as_open(tmp_path: Path) -> None:
+    values = np.array([np.nan, -1.0, 2.0, 0.5], np.float32)
+    bake(square_builder().glb(tmp_path / "a.glb"), tmp_path / "b.glb", "attribute", [values])
+    np.testing.assert_array_equal(attribute(tmp_path / "b.glb", "_AO")[:, 0], [1.0, 0.0, 1.0, 0.5])
+
+
+@pytest.mark.parametrize("embed", [True, False])
+@pytest.mark.parametrize("target", ["b.gltf", "b.glb"])
+def test_a_gltf_is_written_as_either_kind(tmp_path: Path, embed: bool, target: str) -> None:
+    """One file stays one file; buffers beside it stay beside it, the first one goes into a GLB."""
+    source = square_builder().gltf(tmp_path / "a.gltf", embed=embed)
+    (tmp_path / "out").mkdir()
+    bake(source, tmp_path / "out" / target)
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == ([target] if embed or target == "b.glb" else ["a.bin", "b.gltf", "b_ao.bin"])
+    np.testing.assert_array_equal(
+        load(tmp_path / "out" / target).meshes[0].vertices, load(source).meshes[0].vertices
+    )
+    assert attribute(tmp_path / "out" / target, "COLOR_0").shape == (4, 4)
+
+
+def test_a_glb_is_written_as_gltf_with_its_bytes_beside_it(tmp_path: Path) -> None:
+    builder = square_builder()
+    bake(builder.glb(tmp_path / "a.glb"), tmp_path / "b.gltf")
+    document = json.loads((tmp_path / "b.gltf").read_text())
+    assert document["buffers"][0]["uri"] == "b_ao.bin"
+    assert (tmp_path / "b_ao.bin").read_bytes().startswith(bytes(builder.data))
+    assert load(tmp_path / "b.gltf").triangles == 2
+
+
+def test_a_glb_with_chunks_that_a_gltf_cannot_hold_is_refused(tmp_path: Path) -> None:
+    source = square_builder().glb(tmp_path / "a.glb", (1, b"more"))
+    with pytest.raises(OutputError, match=r"Write a \.glb instead"):
+        bake(source, tmp_path / "b.gltf")
+    with pytest.raises(OutputError, match=r"Write a \.glb instead"):
+        gltf.check(load(source), StoreSettings(), tmp_path / "b.gltf")
+
+
+def test_a_glb_whose_buffer_is_beside_it_gets_another_beside_it(tmp_path: Path) -> None:
+    builder = square_builder()
+    (tmp_path / "far.bin").write_bytes(builder.data)
+    path = tmp_path / "a.glb"
+    data, builder.data = bytes(builder.data), bytearray()
+    builder.json["buffers"] = [{"byteLength": len(data), "uri": "far.bin"}]
+    builder.glb(path)
+    bake(path, tmp_path / "b.glb")
+    after, binary, _ = unpack_glb(tmp_path / "b.glb")
+    assert binary == b""
+    assert [buffer["uri"] for buffer in after["buffers"]] == ["far.bin", "b_ao.bin"]
+    assert attribute(tmp_path / "b.glb", "COLOR_0").shape == (4, 4)
+
+
+def test_facts_say_what_is_in_the_file_and_what_a_bake_touches(tmp_path: Path) -> None:
+    builder = Builder()
+    mesh = builder.mesh(builder.primitive(), builder.primitive(mode=0), name="seat")
+    spare = builder.mesh(name="spare")
+    nodes = [builder.node(mesh=mesh), builder.node(mesh=mesh), builder.node(mesh=spare)]
+    builder.json["images"] = [{"uri": "missing.png"}]
+    builder.show(*nodes[:2])
+    source = load(builder.glb(tmp_path / "a.glb")).source
+    assert source is not None
+    facts = source.facts()
+    expected = {
+        "nodes": 3,
+        "meshes": 2,
+        "primitives": 3,
+        "triangles": 4,
+        "points and lines": 1,
+        "UV sets": 0,
+    }
+    assert {key: facts[key] for key in expected} == expected
+    assert facts["a bake would touch"] == ['mesh 0 "seat": 1 of 2 primitives, at 2 nodes']
+    assert facts["problems"] == [
+        "'missing.png' is missing",
+        'mesh 1 "spare" is not part of the scene, and is left as it is',
+        'mesh 0 "seat" primitive 0 has no normals: it is shaded flat, and baked so',
+    ]
+    assert source.format == "GLB"

@@ -1,0 +1,112 @@
+"""The compiled tracer against slow and against foreign ones, ray for ray."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from embreex import rtcore_scene
+from embreex.mesh_construction import TriangleMesh
+
+from aobake import BakeSettings, Scene, visibility
+from aobake.tracing.kernels import mix, turned_frame
+from tests.scenes import Triangles, box, icosphere, joined, moved, patch, rotation, unit
+from tests.tracing.rays import brute_force, directions_of, mixed_bits, occluded, placed, world_of
+
+
+def clutter(seed: int, faces: int = 60) -> Triangles:
+    """Triangles of all sizes, anywhere in the unit cube."""
+    rng = np.random.default_rng(seed)
+    middles = rng.uniform(-1.0, 1.0, (faces, 1, 3))
+    corners = middles + rng.uniform(0.05, 0.6, (faces, 1, 1)) * rng.standard_normal((faces, 3, 3))
+    return Triangles(corners.reshape(-1, 3), np.arange(3 * faces, dtype=np.int32).reshape(-1, 3))
+
+
+MESHES = {
+    "clutter": clutter(1),
+    "more clutter": clutter(2),
+    "box beside a sphere": joined(
+        moved(box(), rotation((1, 2, 3), 0.6)), icosphere(1, 0.4, (0.9, 0.1, 0.3))
+    ),
+    "steps": joined(
+        *(patch((x, -1, x), (x + 1, -1, x), (x + 1, 1, x), (x, 1, x)) for x in (-1.0, 0.0, 0.7))
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize(("rays", "seed"), [(256, 0), (100, 12345678901234567890)])
+def test_a_slow_tracer_counts_the_same_hits_around_points_in_the_open(
+    name: str, rays: int, seed: int
+) -> None:
+    mesh, rng = MESHES[name], np.random.default_rng(7)
+    points, normals = rng.uniform(-1.2, 1.2, (40, 3)), rng.standard_normal((40, 3))
+    estimate = visibility(
+        Scene.from_arrays(*mesh), points, normals, BakeSettings(rays=rays, seed=seed)
+    )
+    for number, (point, normal, mean) in enumerate(
+        zip(points, normals, estimate.mean, strict=True)
+    ):
+        directions = directions_of(seed, number, normal, rays)
+        hit, close = brute_force(np.tile(point, (rays, 1)), directions, mesh)
+        assert abs(round(rays * (1.0 - float(mean))) - int(hit.sum())) <= int(close.sum())
+
+
+@pytest.mark.parametrize("name", ["box beside a sphere", "steps"])
+def test_a_slow_tracer_counts_the_same_hits_from_the_surface(name: str) -> None:
+    """From where the rays truly start, so that the surface itself is traced as well."""
+    mesh = MESHES[name]
+    faces = mesh.vertices[mesh.faces]
+    points = np.einsum("k,fkd->fd", [0.5, 0.3, 0.2], faces)
+    normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    estimate = visibility(Scene.from_arrays(*mesh), points, normals, BakeSettings(rays=128))
+    starts = placed(world_of(mesh), points, normals).origins
+    for number, (start, normal, mean) in enumerate(
+        zip(starts, normals, estimate.mean, strict=True)
+    ):
+        directions = directions_of(0, number, normal, 128)
+        hit, close = brute_force(np.tile(start, (128, 1)), directions, mesh, 1e-7)
+        assert abs(round(128 * (1.0 - float(mean))) - int(hit.sum())) <= int(close.sum())
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_packets_hit_what_the_scene_class_of_embreex_hits(name: str) -> None:
+    world, rng = world_of(MESHES[name]), np.random.default_rng(3)
+    vertices, faces, first_vertex, first_face, *_ = world.arrays
+    origins = rng.uniform(-1.0, 1.0, (50_003, 3)).astype(np.float32)
+    directions = rng.standard_normal(origins.shape).astype(np.float32)
+    foreign = rtcore_scene.EmbreeScene(robust=True)
+    TriangleMesh(
+        foreign, vertices[: first_vertex[1]].copy(), faces[: first_face[1]].astype(np.int32)
+    )
+    expected = foreign.run(origins, directions, query="OCCLUDED") >= 0
+    found = occluded(world.tree, origins, directions)
+    assert 0.05 < found.mean() < 0.95
+    assert (found == expected).all()
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2**63, 2**64 - 1])
+def test_bits_are_mixed_as_in_whole_numbers(seed: int) -> None:
+    for index in (0, 1, 2**31, 10**12):
+        assert int(mix(np.uint64(seed), np.int64(index))) == mixed_bits(seed, index)
+
+
+@pytest.mark.parametrize(
+    "normal",
+    [
+        (0, 0, 1),
+        (0, 0, -1),
+        (1, 0, 0),
+        (0, -1, 0),
+        (1, 2, 3),
+        (1e-9, 0, -1),
+        (-3, 1e-20, -1e-20),
+        (0.0, 0.0, -0.0 - 5),
+    ],
+)
+def test_a_frame_is_orthonormal_and_right_handed(normal: tuple[float, float, float]) -> None:
+    frame = np.empty((3, 3))
+    turned_frame(np.array(normal, np.float64), np.uint64(mixed_bits(3, 4)), frame)
+    assert np.allclose(frame @ frame.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(frame) > 0.0
+    assert np.allclose(frame[2], unit(normal), atol=1e-15)
