@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,11 +21,11 @@ from aobake.points import SurfacePoints
 from aobake.results import BakedVertices, Estimate
 from aobake.settings import BakeSettings
 from aobake.tracing.backfaces import pass_through_backfaces
-from aobake.tracing.estimate import Estimates, Request, estimate
+from aobake.tracing.estimate import Estimates, Request, compile_kernels, estimate
 from aobake.tracing.origins import CONTACT, DOUBTFUL, ENCLOSED, THIN
 from aobake.tracing.world import Placement, Triangles, World, build_world
 
-__all__ = ["bake_vertices", "visibility"]
+__all__ = ["bake_vertices", "build", "surfaces_of", "vertex_points", "visibility"]
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -56,14 +57,20 @@ def bake_vertices(
     seconds: dict[str, float] = {}
     with _timed(seconds, "prepare"):
         decided = plan(scene, settings)
-        surfaces = _surfaces(scene)
+        surfaces = surfaces_of(scene)
         if settings.strict:
             _refuse(scene, [finding for surface in surfaces for finding in surface.findings])
     with _timed(seconds, "build"):
-        prepared = _build(scene, surfaces, settings)
-        points = _vertex_points(scene, prepared)
+        prepared = build(scene, surfaces, settings)
+        points = vertex_points(scene, prepared)
+    request = _request(prepared, points, settings)
+    with _timed(seconds, "compile"):
+        if progress is not None:
+            progress("compile", 0, 1)
+        compile_kernels(prepared.world, request, settings)
     with _timed(seconds, "trace"):
-        found = _estimate(prepared, points, settings, progress)
+        report = None if progress is None else partial(progress, "trace")
+        found = estimate(prepared.world, request, settings, report)
     ao, error = _per_instance(scene, prepared, found)
     found_out = _findings(scene, prepared, found)
     if settings.strict:
@@ -114,8 +121,8 @@ def visibility(
         geometric=None if above is None else above[chosen],
         numbers=chosen,
     )
-    prepared = _build(scene, _surfaces(scene), settings)
-    found = _estimate(prepared, points, settings, None)
+    prepared = build(scene, surfaces_of(scene), settings)
+    found = estimate(prepared.world, _request(prepared, points, settings), settings)
     mean, error = np.ones(len(at), np.float32), np.zeros(len(at), np.float32)
     rays = np.zeros(len(at), np.int32)
     mean[chosen], error[chosen], rays[chosen] = found.mean, found.standard_error, found.rays
@@ -129,7 +136,8 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     seconds[stage] = time.perf_counter() - start
 
 
-def _surfaces(scene: Scene) -> list[Surface]:
+def surfaces_of(scene: Scene) -> list[Surface]:
+    """Each mesh as the tracer needs it, named as a user would name it."""
     return [
         surface_of(mesh, f"mesh {mesh.name!r}" if mesh.name else f"mesh {number}")
         for number, mesh in enumerate(scene.meshes)
@@ -145,7 +153,7 @@ def _not_placed(scene: Scene) -> list[str]:
     ]
 
 
-def _build(scene: Scene, surfaces: Sequence[Surface], settings: BakeSettings) -> Prepared:
+def build(scene: Scene, surfaces: Sequence[Surface], settings: BakeSettings) -> Prepared:
     """Put every instance into one world. Mirrored instances get faces of their own, wound back."""
     parts: dict[tuple[int, bool], int] = {}
     triangles: list[Triangles] = []
@@ -178,7 +186,7 @@ def _hit_filter(scene: Scene, material: int | None, settings: BakeSettings) -> i
     return pass_through_backfaces() if settings.backfaces == "ignore" and not double_sided else 0
 
 
-def _vertex_points(scene: Scene, prepared: Prepared) -> SurfacePoints:
+def vertex_points(scene: Scene, prepared: Prepared) -> SurfacePoints:
     """The vertices to trace from, instance by instance; numbered as they stand in the whole scene."""
     positions, normals, numbers = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, np.int64)]
     first = 0
@@ -215,22 +223,19 @@ def _turned_normals(normals: FloatArray, linear: FloatArray) -> FloatArray:
     return unit_rows(sign * normals @ cofactors.T)
 
 
-def _estimate(
-    prepared: Prepared, points: SurfacePoints, settings: BakeSettings, progress: Progress | None
-) -> Estimates:
+def _request(prepared: Prepared, points: SurfacePoints, settings: BakeSettings) -> Request:
+    """The points as the tracer wants them, over the ground where one is asked for."""
     ground = None
     if settings.ground is not None:
         lowest = float(prepared.lowest["xyz".index(settings.ground[1])])
         ground = lowest if np.isfinite(lowest) else None
-    request = Request(
+    return Request(
         positions=points.positions,
         normals=points.normals,
         geometric=points.geometric,
         numbers=points.numbers,
         ground=ground,
     )
-    report = None if progress is None else lambda done, total: progress("trace", done, total)
-    return estimate(prepared.world, request, settings, report)
 
 
 def _per_instance(

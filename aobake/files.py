@@ -23,11 +23,11 @@ def read_bytes(path: Path, needed_by: str | None = None) -> bytes:
     """
     who = f"{needed_by}: {path.name}" if needed_by else str(path)
     try:
-        if not path.is_file():
-            if not path.exists():
-                raise InputError(f"{who}: there is no such file. Check the path.")
-            raise InputError(f"{who}: this is not a regular file. Give the file itself.")
+        if path.exists() and not path.is_file():
+            raise InputError(f"{who}: this is not a regular file. Give the file itself.")  # noqa: TRY301 - one place
         return path.read_bytes()
+    except FileNotFoundError as error:
+        raise InputError(f"{who}: there is no such file. Check the path.") from error
     except InputError:  # a ValueError itself
         raise
     except OSError as error:
@@ -73,6 +73,7 @@ def write_files(files: Mapping[Path, Content]) -> None:
     Existing targets are replaced. Raises OutputError.
     """
     staged: list[tuple[str, Path]] = []
+    target: Path | None = None
     try:
         for target, content in files.items():
             check_writable(target)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from aobake import environment, files
 from aobake.errors import InputError
+from aobake.findings import Finding
 from aobake.plan import Plan
 from aobake.results import BakedVertices
 from aobake.settings import StoreSettings
@@ -44,6 +45,8 @@ class ErrorSummary:
 class Report:
     """One bake.
 
+    findings : what was passed over, mended or is in doubt; warnings : the same and more, for people
+
     settings : of the bake and of how it is stored; settings_file : the file that some came from
     points : points that were given a value
     ao_mean : their mean, or None where there are none
@@ -66,6 +69,7 @@ class Report:
     rays: int
     mrays_per_s: float | None
     error: ErrorSummary
+    findings: tuple[Finding, ...]
     warnings: tuple[str, ...]
     versions: Mapping[str, str]
     machine: str
@@ -119,6 +123,7 @@ def of_vertices(
         rays=baked.rays,
         mrays_per_s=baked.rays / traced_s / 1e6 if traced_s > 0.0 else None,
         error=error_summary(_joined(baked.standard_error)),
+        findings=baked.findings,
         warnings=tuple(dict.fromkeys((*baked.scene.warnings, *baked.warnings, *warnings))),
         versions=here,
         machine=environment.machine(),
@@ -155,5 +160,5 @@ def _joined(arrays: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
 
 
 def _in_order(seconds: Mapping[str, float]) -> list[str]:
-    known = ["read", "prepare", "build", "trace", "write"]
+    known = ["read", "prepare", "build", "compile", "trace", "write"]
     return [stage for stage in known if stage in seconds] + [s for s in seconds if s not in known]

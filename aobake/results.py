@@ -43,7 +43,7 @@ class BakedVertices:
     ao : one (V_i,) float32 array per instance, in the scene's order; 1 = open, 0 = fully occluded
     standard_error : the same shapes; 0 where nothing had to be estimated
     rays : rays spent on the whole scene
-    seconds : stage -> seconds ("prepare", "build", "trace")
+    seconds : stage -> seconds ("prepare", "build", "compile", "trace")
     findings : what was passed over, mended or is in doubt, counted and located
     warnings : the same, with what the reader had to say, one line each
     """

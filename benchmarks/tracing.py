@@ -35,7 +35,7 @@ PACKETS = 1 << 15  # ready-made at a time and thread: 12 MiB
 
 
 @tight_kernel
-def make_packets(origin, normal, numbers, sets, rays, frame, packets):  # type: ignore[no-untyped-def]
+def make_packets(origin, normal, numbers, sets, frame, packets):
     """Fill packets (N, 96) with all rays of some points, as kernels.trace makes them."""
     n = 0
     for point in range(len(origin)):
@@ -50,7 +50,7 @@ def make_packets(origin, normal, numbers, sets, rays, frame, packets):  # type: 
 
 
 @tight_kernel
-def trace_packets(function, scene, valid, packets):  # type: ignore[no-untyped-def]
+def trace_packets(function, scene, valid, packets):
     """Nothing but the calls."""
     for n in range(len(packets)):
         kernels.call_packet(function, valid.ctypes.data, scene, packets[n].ctypes.data)
@@ -61,8 +61,8 @@ class Bare:
 
     def __init__(self, scene: aobake.Scene, rays: int) -> None:
         settings = aobake.BakeSettings(rays=rays)
-        self.prepared = bake._build(scene, bake._surfaces(scene), settings)
-        points = bake._vertex_points(scene, self.prepared)
+        self.prepared = bake.build(scene, bake.surfaces_of(scene), settings)
+        points = bake.vertex_points(scene, self.prepared)
         world = self.prepared.world
         self.origins = np.empty(points.positions.shape, np.float32)
         functions = embree.functions()
@@ -79,7 +79,7 @@ class Bare:
         )
         self.origins_s = time.perf_counter() - start
         self.normals = points.normals.astype(np.float32)
-        self.numbers, self.rays, self.sets = points.numbers, rays, direction_sets(rays)
+        self.numbers, self.sets = points.numbers, direction_sets(rays)
         self.threads = processors()
         self.memory = [
             aligned(PACKETS * 96, np.float32).reshape(-1, 96) for _ in range(self.threads)
@@ -110,7 +110,6 @@ class Bare:
             self.normals[part],
             self.numbers[part],
             self.sets,
-            self.rays,
             frame,
             packets,
         )
@@ -173,9 +172,8 @@ def main() -> None:
     print(f"| tracing stage of bake_vertices | {_spread([rays / r[1] for r in rows])} Mrays/s |")
     print(f"| tracing stage / bare rate | {_spread(traced)} |")
     print(f"| whole bake_vertices / bare rate | {_spread(whole)} |")
-    print(
-        f"| origins, one thread, of tracing | {bare.origins_s / bare.threads / statistics.median(r[1] for r in rows):.3f} |"
-    )
+    origins_share = bare.origins_s / bare.threads / statistics.median(r[1] for r in rows)
+    print(f"| origins / tracing stage | {origins_share:.3f} |")
     print(f"| `aobake vertex` | {_spread([c[0] for c in commands])} s |")
     print(f"| `aobake vertex` / its tracing | {_spread([c[0] / c[1] for c in commands])} |")
 

@@ -20,7 +20,7 @@ PACKAGE = ROOT / "aobake"
 
 # From the ground up: a module imports from its own layer and from those before it.
 LAYERS = (
-    ("errors", "settings", "files"),
+    ("errors", "findings", "settings", "files"),
     ("tracing",),
     ("meshes",),
     ("atlas",),

@@ -27,6 +27,7 @@ def baked(standard_error: list[float], *, seconds: float = 2.0) -> BakedVertices
         standard_error=[error],
         rays=5_000_000,
         seconds={"trace": seconds, "prepare": 0.5},
+        findings=(),
         warnings=("a vertex is odd.",),
     )
 

@@ -52,7 +52,7 @@ def vertex(
     with leaving_promptly():
         scene = load(input, root=source.root, scene=source.scene)
     seconds = {"read": time.perf_counter() - started}
-    check_format(scene, output, chosen.store)
+    warnings = check_format(scene, output, chosen.store)
     read = scene.source.files if scene.source else ()
     bake_vertices_to(
         scene,
@@ -63,6 +63,7 @@ def vertex(
             common=common,
             inputs=read,
             seconds=seconds,
+            warnings=warnings,
         ),
     )
     return 0

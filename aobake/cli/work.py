@@ -18,7 +18,8 @@ __all__ = ["Work", "bake_vertices_to"]
 
 @dataclass(frozen=True, kw_only=True)
 class Work:
-    """What is to be done: command names it; inputs and seconds are what was read, and how long it took."""
+    """What is to be done: command names it; inputs and seconds are what was read, and how long it took;
+    warnings are what there is to say before anything was baked."""
 
     command: str
     output: Path
@@ -26,6 +27,7 @@ class Work:
     common: CommonOptions
     inputs: Sequence[Path] = ()
     seconds: dict[str, float] = field(default_factory=dict)
+    warnings: Sequence[str] = ()
 
 
 def bake_vertices_to(scene: Scene, work: Work) -> report.Report:
@@ -45,6 +47,7 @@ def bake_vertices_to(scene: Scene, work: Work) -> report.Report:
         store=work.chosen.store,
         settings_file=work.chosen.file,
         seconds=work.seconds,
+        warnings=work.warnings,
     )
     if work.common.report is not None:
         done.write(work.common.report)

@@ -24,7 +24,7 @@ def first_equal_row(*columns: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 @kernel
-def _group(a, b, first):  # type: ignore[no-untyped-def]
+def _group(a, b, first):
     size = 4
     while size < 2 * len(first):
         size *= 2

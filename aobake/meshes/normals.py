@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from aobake.meshes.coincident import first_equal_row
 from aobake.tracing.compiled import inlined, tight_kernel
-from aobake.tracing.vectors import cross, dot, length, minus, row
+from aobake.tracing.vectors import cross, dot, largest, length, minus, row, scaled
 
 __all__ = ["CREASE_DEGREES", "computed_normals", "unit_rows"]
 
@@ -80,17 +80,7 @@ def _corners_by_place(
 
 
 @inlined
-def scaled(a, size):  # type: ignore[no-untyped-def]
-    return (a[0] / size, a[1] / size, a[2] / size)
-
-
-@inlined
-def largest(a):  # type: ignore[no-untyped-def]
-    return max(abs(a[0]), abs(a[1]), abs(a[2]))
-
-
-@inlined
-def _front(vertices, faces, f):  # type: ignore[no-untyped-def]
+def _front(vertices, faces, f):
     """Unit normal of a face; zeros for one without area. Sides are scaled first, against underflow."""
     a = row(vertices, faces[f, 0])
     u, v = minus(row(vertices, faces[f, 1]), a), minus(row(vertices, faces[f, 2]), a)
@@ -103,7 +93,7 @@ def _front(vertices, faces, f):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _angle(vertices, faces, f, k):  # type: ignore[no-untyped-def]
+def _angle(vertices, faces, f, k):
     """Angle of a face at its corner k. Source: W. Kahan's stable form, 2 atan2(|u - v|, |u + v|)."""
     a = row(vertices, faces[f, k])
     u = minus(row(vertices, faces[f, (k + 1) % 3]), a)
@@ -116,7 +106,7 @@ def _angle(vertices, faces, f, k):  # type: ignore[no-untyped-def]
 
 
 @tight_kernel
-def _add_own(vertices, faces, counts, sums):  # type: ignore[no-untyped-def]
+def _add_own(vertices, faces, counts, sums):
     """Add to sums (V, 3) the normals of the faces of each vertex, weighted by their angle there."""
     for f in range(len(faces)):
         if counts[f]:
@@ -128,7 +118,7 @@ def _add_own(vertices, faces, counts, sums):  # type: ignore[no-untyped-def]
 
 
 @tight_kernel
-def _add_around(  # type: ignore[no-untyped-def]
+def _add_around(  # noqa: PLR0913, PLR0917 - a kernel takes its arrays one by one
     vertices, faces, counts, place, start, corners, own, cosine, sums
 ):
     """Add to sums (V, 3) the faces that share a vertex's place only, where they bend from it mildly."""

@@ -51,13 +51,13 @@ def _neighbours(
     shared[left] = shared[right] = True
     return (
         np.stack([left // 3, right // 3], axis=1),
-        a[left] == a[right],
-        ~shared.reshape(-1, 3).all(axis=1),
+        np.asarray(a[left] == a[right], bool),
+        np.asarray(~shared.reshape(-1, 3).all(axis=1), bool),
     )
 
 
 @inlined
-def _find(parent, parity, face):  # type: ignore[no-untyped-def]
+def _find(parent, parity, face):
     """The root of a face's part, and whether the face runs against it; the path is shortened."""
     root, against = face, np.uint8(0)
     while parent[root] != root:
@@ -73,7 +73,7 @@ def _find(parent, parity, face):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _settle(vertices, faces, pairs, opposed, open_faces, turned, inward):  # type: ignore[no-untyped-def]
+def _settle(vertices, faces, pairs, opposed, open_faces, turned, inward):
     """Fill turned and inward (F,): a union-find over neighbours that keeps each face's parity."""
     count = len(faces)
     parent, parity = np.arange(count), np.zeros(count, np.uint8)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,7 @@ __all__ = ["AlphaMode", "FloatArray", "Instance", "IntArray", "Material", "Mesh"
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int32]
+ScalarT = TypeVar("ScalarT", bound=np.generic)
 AlphaMode = Literal["OPAQUE", "MASK", "BLEND"]
 
 MOST_VERTICES = 2**31 - 1  # Embree's and our indices are 32 bits wide
@@ -179,7 +180,8 @@ class Scene:
         clouds are passed over. Raises InputError for any other object.
         """
         if hasattr(mesh, "faces") and hasattr(mesh, "vertices"):
-            return cls.from_meshes([_from_trimesh(mesh, str(mesh.metadata.get("name") or ""))])
+            title = str(mesh.metadata.get("name") or "")
+            return cls.from_meshes([_from_trimesh(cast("trimesh.Trimesh", mesh), title)])
         if not (hasattr(mesh, "geometry") and hasattr(mesh, "graph")):
             raise InputError(
                 f"a {type(mesh).__name__} is no trimesh.Trimesh or trimesh.Scene. "
@@ -222,14 +224,14 @@ def _mesh(vertices: ArrayLike, faces: ArrayLike, normals: ArrayLike | None, name
 
 def _from_trimesh(mesh: trimesh.Trimesh, name: str) -> Mesh:
     # vertex_normals would compute them, and merge what is sharp; the cache has them only if they were given.
-    normals = mesh._cache.cache.get("vertex_normals")
+    normals = mesh._cache.cache.get("vertex_normals")  # noqa: SLF001 - there is no public way
     return _mesh(mesh.vertices, mesh.faces, normals, name)
 
 
-def _rows(values: ArrayLike, dtype: type, what: str) -> NDArray:
+def _rows(values: ArrayLike, dtype: type[ScalarT], what: str) -> NDArray[ScalarT]:
     """(N, 3) C-ordered copy or view; InputError for any other shape or kind."""
     try:
-        array = np.ascontiguousarray(values, dtype)
+        array: NDArray[ScalarT] = np.ascontiguousarray(values, dtype)
     except (TypeError, ValueError) as error:
         raise InputError(f"{what} are no array of numbers ({error}).") from error
     if array.size == 0:
@@ -243,7 +245,7 @@ def _faces(values: ArrayLike, vertices: int, where: str) -> IntArray:
     given = np.asarray(values)
     if given.size and given.dtype.kind not in "iu":
         raise InputError(f"{where}: faces are {given.dtype}; whole numbers are needed.")
-    if given.size and not (0 <= int(given.min()) and int(given.max()) < vertices):
+    if given.size and not (int(given.min()) >= 0 and int(given.max()) < vertices):
         flat = given.reshape(-1)
         bad = int(np.argmax((flat < 0) | (flat >= vertices)))
         raise InputError(
@@ -252,7 +254,7 @@ def _faces(values: ArrayLike, vertices: int, where: str) -> IntArray:
     return _rows(given, np.int32, f"{where}: faces")
 
 
-def _frozen(array: NDArray) -> NDArray:
+def _frozen(array: NDArray[ScalarT]) -> NDArray[ScalarT]:
     """A read-only view; the caller's own array stays as writable as it was."""
     view = array.view()
     view.flags.writeable = False

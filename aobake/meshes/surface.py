@@ -17,7 +17,7 @@ from aobake.meshes.normals import CREASE_DEGREES, computed_normals, unit_rows
 from aobake.meshes.orientation import consistent_winding
 from aobake.meshes.scene import Mesh
 from aobake.tracing.compiled import tight_kernel
-from aobake.tracing.vectors import cross, dot, length, minus, row
+from aobake.tracing.vectors import cross, dot, largest, length, minus, row, scaled
 
 __all__ = ["Surface", "findings", "surface_of"]
 
@@ -49,7 +49,7 @@ def surface_of(mesh: Mesh, name: str = "") -> Surface:
     name : what findings call it
     """
     vertices = mesh.vertices
-    finite = np.isfinite(vertices).all(axis=1)
+    finite = np.asarray(np.isfinite(vertices).all(axis=1), bool)
     clean = vertices if finite.all() else np.where(finite[:, None], vertices, 0.0)
     given = mesh.faces.astype(np.uint32)
     flat = faces_without_area(clean, given)
@@ -140,20 +140,16 @@ def faces_without_area(vertices: FloatArray, faces: NDArray[np.uint32]) -> NDArr
 
 
 @tight_kernel
-def _find_flat(vertices, faces, flat):  # type: ignore[no-untyped-def]
+def _find_flat(vertices, faces, flat):
     for f in range(len(faces)):
         a = row(vertices, faces[f, 0])
         u, v = minus(row(vertices, faces[f, 1]), a), minus(row(vertices, faces[f, 2]), a)
-        size = max(abs(u[0]), abs(u[1]), abs(u[2]), abs(v[0]), abs(v[1]), abs(v[2]))
-        if not size > 0.0:
-            flat[f] = True
-            continue
-        n = cross((u[0] / size, u[1] / size, u[2] / size), (v[0] / size, v[1] / size, v[2] / size))
-        flat[f] = not length(n) > 0.0
+        size = max(largest(u), largest(v))
+        flat[f] = not size > 0.0 or not length(cross(scaled(u, size), scaled(v, size))) > 0.0
 
 
 @tight_kernel
-def _look_against(vertices, faces, normals, over):  # type: ignore[no-untyped-def]
+def _look_against(vertices, faces, normals, over):
     for f in range(len(faces)):
         a = row(vertices, faces[f, 0])
         front = cross(minus(row(vertices, faces[f, 1]), a), minus(row(vertices, faces[f, 2]), a))

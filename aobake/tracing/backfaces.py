@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import functools
 
+import numba
 import numpy as np
-from numba import carray, types
+from numba import types
 
 from aobake.tracing.compiled import callback
 from aobake.tracing.contacts import pointer_to
@@ -13,13 +14,13 @@ from aobake.tracing.contacts import pointer_to
 __all__ = ["pass_through_backfaces"]
 
 
-def _reject(arguments):  # type: ignore[no-untyped-def]
+def _reject(arguments):
     """RTCFilterFunctionN: make hits invalid whose ray runs along the triangle's normal."""
-    fields = carray(arguments, 6, np.int64)
-    count = np.int64(carray(arguments, 12, np.int32)[10])
-    valid = carray(pointer_to(fields[0]), count, np.int32)
-    ray = carray(pointer_to(fields[3]), 12 * count, np.float32)
-    hit = carray(pointer_to(fields[4]), 3 * count, np.float32)
+    fields = numba.carray(arguments, 6, np.int64)
+    count = np.int64(numba.carray(arguments, 12, np.int32)[10])
+    valid = numba.carray(pointer_to(fields[0]), count, np.int32)
+    ray = numba.carray(pointer_to(fields[3]), 12 * count, np.float32)
+    hit = numba.carray(pointer_to(fields[4]), 3 * count, np.float32)
     for k in range(count):
         along = 0.0
         for i in range(3):

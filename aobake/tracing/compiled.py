@@ -8,7 +8,7 @@ process instead of failing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
@@ -19,13 +19,10 @@ __all__ = ["aligned", "callback", "inlined", "kernel", "tight_kernel"]
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# numpy's error model drops the zero-division checks, which would keep loops from being vectorised.
-OPTIONS = {"nogil": True, "error_model": "numpy"}
-
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function over arrays and numbers when it is first called; keep the code on disk."""
-    return _kept_on_disk(function, OPTIONS)
+    return _kept_on_disk(function, counted=True)
 
 
 def tight_kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -34,19 +31,25 @@ def tight_kernel(function: Callable[P, R]) -> Callable[P, R]:
     Every view of an array is a counted reference else, and threads that share the array fight over
     the counter: it made the placing of origins six times slower. Scratch memory is an argument.
     """
-    return _kept_on_disk(function, {**OPTIONS, "_nrt": False})
+    return _kept_on_disk(function, counted=False)
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """A function that kernels call; LLVM merges it into them. Allocates nothing."""
-    return numba.njit(**OPTIONS, _nrt=False)(function)  # type: ignore[no-any-return]
+    return _compiled(function, kept=False, counted=False)
 
 
-def _kept_on_disk(function: Callable[P, R], options: dict[str, object]) -> Callable[P, R]:
+def _kept_on_disk(function: Callable[P, R], *, counted: bool) -> Callable[P, R]:
     try:
-        return numba.njit(cache=True, **options)(function)  # type: ignore[no-any-return]
+        return _compiled(function, kept=True, counted=counted)
     except RuntimeError:  # "no locator available": nowhere to keep it
-        return numba.njit(**options)(function)  # type: ignore[no-any-return]
+        return _compiled(function, kept=False, counted=counted)
+
+
+def _compiled(function: Callable[P, R], *, kept: bool, counted: bool) -> Callable[P, R]:
+    # numpy's error model drops the zero-division checks, which would keep loops from being vectorised.
+    compiler: Any = numba.njit(nogil=True, error_model="numpy", cache=kept, _nrt=counted)  # type: ignore[call-overload]
+    return cast("Callable[P, R]", compiler(function))
 
 
 def aligned(count: int, dtype: type[np.generic]) -> NDArray[np.generic]:
@@ -57,14 +60,19 @@ def aligned(count: int, dtype: type[np.generic]) -> NDArray[np.generic]:
     return memory[first : first + count * size].view(dtype)
 
 
-def callback(signature: object, function: Callable[P, R]) -> int:
+def callback(signature: object, function: Callable[..., object]) -> int:
     """The address of a C function made from a Python one. The code lives as long as the process."""
     try:
-        compiled = numba.cfunc(signature, cache=True, **OPTIONS)(function)
+        compiled = _c_function(signature, function, kept=True)
     except RuntimeError:
-        compiled = numba.cfunc(signature, **OPTIONS)(function)
+        compiled = _c_function(signature, function, kept=False)
     _ALIVE.append(compiled)
     return int(compiled.address)
+
+
+def _c_function(signature: object, function: Callable[..., object], *, kept: bool) -> Any:
+    compiler: Any = numba.cfunc(signature, cache=kept, error_model="numpy")
+    return compiler(function)
 
 
 _ALIVE: list[object] = []  # a cfunc that is collected takes its machine code with it

@@ -86,7 +86,7 @@ def shortest_edges(vertices: FloatArray, faces: FaceArray) -> FloatArray:
 
 
 @kernel
-def shorten(vertices, faces, shortest):  # type: ignore[no-untyped-def]
+def shorten(vertices, faces, shortest):
     """Lower shortest (V,) to the length of the shortest edge at each vertex."""
     for f in range(len(faces)):
         for k in range(3):

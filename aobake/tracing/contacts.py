@@ -9,12 +9,12 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from llvmlite import ir
-from numba import carray, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-
 from numpy.typing import NDArray
 
 from aobake.tracing.compiled import aligned, callback, inlined
@@ -46,22 +46,22 @@ ARGUMENT_USER, ARGUMENT_PRIMITIVE, ARGUMENT_CONTEXT = (
 
 
 @intrinsic
-def pointer_to(typingctx, address):  # type: ignore[no-untyped-def]
+def pointer_to(typingctx, address):
     """An integer address as a pointer."""
     signature = types.voidptr(types.intp)
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, arguments):
         return builder.inttoptr(arguments[0], cgutils.voidptr_t)
 
     return signature, generate
 
 
 @intrinsic
-def call_point_query(typingctx, function, scene, query, context, note, user):  # type: ignore[no-untyped-def]
+def call_point_query(typingctx, function, scene, query, context, note, user):
     """rtcPointQuery(scene, query, context, note, user), all given as integer addresses."""
     signature = types.void(*[types.intp] * 6)
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, arguments):
         pointer = ir.IntType(8).as_pointer()
         prototype = ir.FunctionType(ir.IntType(1), [pointer] * 5)
         target = builder.inttoptr(arguments[0], prototype.as_pointer())
@@ -71,12 +71,12 @@ def call_point_query(typingctx, function, scene, query, context, note, user):  #
     return signature, generate
 
 
-def _note(arguments):  # type: ignore[no-untyped-def]
+def _note(arguments):
     """Append (instance, geometry, primitive) to the user's buffer, whose first word counts them."""
-    fields = carray(arguments, 4, np.int64)
-    words = carray(arguments, 8, np.uint32)
-    found = carray(pointer_to(fields[ARGUMENT_USER]), 1 + 3 * CANDIDATES, np.uint32)
-    context = carray(pointer_to(fields[ARGUMENT_CONTEXT]), CONTEXT_WORDS, np.uint32)
+    fields = numba.carray(arguments, 4, np.int64)
+    words = numba.carray(arguments, 8, np.uint32)
+    found = numba.carray(pointer_to(fields[ARGUMENT_USER]), 1 + 3 * CANDIDATES, np.uint32)
+    context = numba.carray(pointer_to(fields[ARGUMENT_CONTEXT]), CONTEXT_WORDS, np.uint32)
     count = found[0]
     if count < CANDIDATES:
         found[1 + 3 * count] = context[CONTEXT_INSTANCE]
@@ -102,7 +102,7 @@ def query_buffers() -> tuple[NDArray[np.generic], NDArray[np.generic], NDArray[n
 
 
 @inlined
-def candidates_near(function, note, scene, point, radius, buffers):  # type: ignore[no-untyped-def]
+def candidates_near(function, note, scene, point, radius, buffers):
     """Note the triangles of all leaves that a ball touches in the last of the buffers.
 
     It then holds their number C and C rows (instance or NO_INSTANCE, geometry, primitive), in an order
@@ -127,14 +127,14 @@ def candidates_near(function, note, scene, point, radius, buffers):  # type: ign
 
 
 @inlined
-def comes_after(found, j, a, b, c):  # type: ignore[no-untyped-def]
+def comes_after(found, j, a, b, c):
     """Whether row j of the noted triangles comes after (a, b, c)."""
     x, y, z = found[1 + 3 * j], found[2 + 3 * j], found[3 + 3 * j]
     return x > a or (x == a and (y > b or (y == b and z > c)))
 
 
 class Touching(NamedTuple):
-    """The triangles that touch a point, relative to it; the first `count` rows are filled.
+    """The triangles that touch a point, relative to it; the first `filled` rows count.
 
     corners : (3 K, 3) float64
     fronts : (K, 3) float64, unit normals
@@ -143,7 +143,7 @@ class Touching(NamedTuple):
     slack : how far the transform of an instance among them may be off
     """
 
-    count: int
+    filled: int
     corners: NDArray[np.float64]
     fronts: NDArray[np.float64]
     inward: NDArray[np.float64]
@@ -164,7 +164,7 @@ def new_touching() -> Touching:
 
 
 @inlined
-def load_corners(world, found, n, point, corners, first):  # type: ignore[no-untyped-def]
+def load_corners(world, found, n, point, corners, first):
     """Put the corners of candidate n, in float64, relative to the point, into rows from `first` on."""
     vertices, faces, first_vertex, first_face, flat, placed, matrices, _ = world
     alone = found[1 + 3 * n] == NO_INSTANCE
@@ -182,16 +182,16 @@ def load_corners(world, found, n, point, corners, first):  # type: ignore[no-unt
 
 
 @inlined
-def out_of_reach(a, b, c, radius):  # type: ignore[no-untyped-def]
+def out_of_reach(a, b, c, radius):
     """Whether the box around a triangle is farther away from 0 than the radius."""
-    for i in range(3):
+    for i in range(3):  # noqa: SIM110 - compiled
         if min(a[i], b[i], c[i]) > radius or max(a[i], b[i], c[i]) < -radius:
             return True
     return False
 
 
 @inlined
-def distance_to_triangle(a, b, c):  # type: ignore[no-untyped-def]
+def distance_to_triangle(a, b, c):
     """How far the triangle a b c is from 0. Source: Ericson, Real-Time Collision Detection, 5.1.5."""
     ab, ac = minus(b, a), minus(c, a)
     d1, d2 = -dot(ab, a), -dot(ac, a)
@@ -221,7 +221,7 @@ def distance_to_triangle(a, b, c):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def touching(ask, world, point, radius, buffers, near):  # type: ignore[no-untyped-def]
+def touching(ask, world, point, radius, buffers, near):
     """The triangles within a radius of the point, as a Touching that uses the memory of `near`.
 
     ask : (address of rtcPointQuery, address of the callback, address of the tree)

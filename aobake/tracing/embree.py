@@ -12,11 +12,12 @@ import ctypes
 import functools
 import importlib.metadata
 import importlib.util
-import sys
+import platform
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ PROPERTY_VERSION = 0
 VERTEX_BYTES, FACE_BYTES = 12, 12
 READ_AHEAD_BYTES = 16  # Embree loads a vertex with one 16-byte read, also the last one of a buffer
 
-_SIGNATURES: dict[str, tuple[object, list[object]]] = {
+_SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "rtcNewDevice": (ctypes.c_void_p, [ctypes.c_char_p]),
     "rtcGetDeviceError": (ctypes.c_int, [ctypes.c_void_p]),
     "rtcGetDeviceProperty": (ctypes.c_ssize_t, [ctypes.c_void_p, ctypes.c_int]),
@@ -229,7 +230,7 @@ def _library_path() -> Path:
             "the package embreex, which brings Embree, is not installed. pip install embreex "
             "(it exists for Linux x86-64, macOS and Windows, not for Linux on Arm)."
         )
-    if sys.platform != "win32":
+    if platform.system() != "Windows":
         return Path(module.origin)
     files = importlib.metadata.files("embreex") or []
     found = [

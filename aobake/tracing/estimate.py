@@ -36,7 +36,7 @@ from aobake.tracing.origins import scratch as origins_scratch
 from aobake.tracing.sampling import direction_sets
 from aobake.tracing.world import World
 
-__all__ = ["Estimates", "Request", "estimate"]
+__all__ = ["Estimates", "Request", "compile_kernels", "estimate"]
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -75,6 +75,25 @@ class Estimates:
     rays: NDArray[np.int32]
     states: NDArray[np.uint8]
 
+    @classmethod
+    def blank(cls, count: int) -> Estimates:
+        """For `count` points, all open and nothing spent yet."""
+        return cls(
+            mean=np.ones(count, np.float32),
+            standard_error=np.zeros(count, np.float32),
+            rays=np.zeros(count, np.int32),
+            states=np.zeros(count, np.uint8),
+        )
+
+
+def compile_kernels(world: World, request: Request, settings: BakeSettings) -> None:
+    """Compile what these settings need, or load it from disk, in the calling thread.
+
+    There an interrupt ends it; threads that compile at once would wait for each other.
+    """
+    nothing = Estimates.blank(0)
+    _block(world, request, settings, slice(0, 0), nothing)
+
 
 def estimate(
     world: World, request: Request, settings: BakeSettings, progress: Progress | None = None
@@ -85,12 +104,7 @@ def estimate(
         work, as does a KeyboardInterrupt, within a fraction of a second
     """
     count = len(request.positions)
-    result = Estimates(
-        mean=np.ones(count, np.float32),
-        standard_error=np.zeros(count, np.float32),
-        rays=np.zeros(count, np.int32),
-        states=np.zeros(count, np.uint8),
-    )
+    result = Estimates.blank(count)
     rays = settings.rays if settings.tolerance is None else settings.max_rays
     step = max(1, min(MOST_POINTS, BLOCK_RAYS // rays))
     _block(
@@ -101,7 +115,7 @@ def estimate(
     def work(block: slice) -> int:
         if not stop.is_set():
             _block(world, request, settings, block, result)
-        return block.stop - block.start
+        return int(block.stop - block.start)
 
     blocks = [slice(first, min(first + step, count)) for first in range(0, count, step)]
     with ThreadPoolExecutor(settings.threads or processors(), "aobake") as pool:

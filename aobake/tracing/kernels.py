@@ -19,7 +19,6 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-
 from numpy.typing import NDArray
 
 from aobake.tracing.compiled import aligned, inlined, tight_kernel
@@ -35,11 +34,11 @@ RAY_HIT_FLOATS = 21 * 8
 
 
 @intrinsic
-def call_packet(typingctx, function, valid, scene, rays):  # type: ignore[no-untyped-def]
+def call_packet(typingctx, function, valid, scene, rays):
     """function(valid, scene, rays, no arguments), all given as integer addresses."""
     signature = types.void(types.intp, types.intp, types.intp, types.intp)
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, arguments):
         pointer = ir.IntType(8).as_pointer()
         prototype = ir.FunctionType(ir.VoidType(), [pointer] * 4)
         function, *addresses = arguments
@@ -52,7 +51,7 @@ def call_packet(typingctx, function, valid, scene, rays):  # type: ignore[no-unt
 
 
 @inlined
-def mix(seed, index):  # type: ignore[no-untyped-def]
+def mix(seed, index):
     """64 well-mixed bits of a seed and an index. Source: SplitMix64, Steele, Lea, Flood, 2014."""
     z = np.uint64(seed) * np.uint64(0xD1342543DE82EF95) + np.uint64(index)
     for _ in range(2):
@@ -64,7 +63,7 @@ def mix(seed, index):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def turned_frame(normal, bits, frame):  # type: ignore[no-untyped-def]
+def turned_frame(normal, bits, frame):
     """Fill frame (3, 3) with a tangent, a bitangent and the unit normal, turned by an angle from bits.
 
     Source: Duff et al., Building an orthonormal basis, revisited, JCGT 6(1), 2017.
@@ -85,7 +84,7 @@ def turned_frame(normal, bits, frame):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def aim(rays, directions, frame, far):  # type: ignore[no-untyped-def]
+def aim(rays, directions, frame, far):
     """Point the eight rays along directions (3, 8), given about +z, in the frame."""
     for k in range(8):
         x, y, z = directions[0, k], directions[1, k], directions[2, k]
@@ -96,7 +95,7 @@ def aim(rays, directions, frame, far):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def set_out(rays, origin):  # type: ignore[no-untyped-def]
+def set_out(rays, origin):
     """Put the origin of all eight rays; the rows that stay the same for every packet of a point."""
     for k in range(8):
         rays[8 * ORIGIN + k] = origin[0]
@@ -105,7 +104,7 @@ def set_out(rays, origin):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def ready(rays, words):  # type: ignore[no-untyped-def]
+def ready(rays, words):
     """Rows that no packet changes: near end, time, mask and flags."""
     for k in range(8):
         rays[8 * NEAR + k] = 0.0
@@ -115,7 +114,7 @@ def ready(rays, words):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def choose(counts, rays, lanes, geometric):  # type: ignore[no-untyped-def]
+def choose(counts, rays, lanes, geometric):
     """Mark the rays that count: those of the set, above the geometric surface where one is given."""
     for k in range(8):
         counts[k] = -1 if k < lanes else 0
@@ -131,7 +130,7 @@ def choose(counts, rays, lanes, geometric):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def stop_at_ground(valid, rays, ground, point, falloff):  # type: ignore[no-untyped-def]
+def stop_at_ground(valid, rays, ground, point, falloff):
     """End the sinking rays at the ground: at once where any hit settles them, else at its distance."""
     axis, heights = ground
     for k in range(8):
@@ -145,7 +144,7 @@ def stop_at_ground(valid, rays, ground, point, falloff):  # type: ignore[no-unty
 
 
 @inlined
-def openness(reached, far, falloff):  # type: ignore[no-untyped-def]
+def openness(reached, far, falloff):
     """How open a ray counts that got as far as `reached`: 1 for one that met nothing."""
     if falloff is None:
         return 1.0 if reached >= 0.0 else 0.0
@@ -162,7 +161,7 @@ def scratch() -> tuple[
 
 
 @tight_kernel
-def trace(  # type: ignore[no-untyped-def]
+def trace(
     functions,
     scene,
     origins,

@@ -41,7 +41,7 @@ WANTED, ROUNDS = 0.25, 48  # margin that the search for a direction stops at, an
 
 
 @inlined
-def covers(near, j, q, margin):  # type: ignore[no-untyped-def]
+def covers(near, j, q, margin):
     """Whether touching triangle j holds q, a point of its plane, give or take a margin."""
     front = row(near.fronts, j)
     for k in range(3):
@@ -53,7 +53,7 @@ def covers(near, j, q, margin):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def same_corners(near, i, j, margin):  # type: ignore[no-untyped-def]
+def same_corners(near, i, j, margin):
     """Whether two touching triangles have the same corners, in any order: a wall with two sides."""
     for k in range(3):
         a, found = row(near.corners, 3 * i + k), False
@@ -65,20 +65,20 @@ def same_corners(near, i, j, margin):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def above(near, j):  # type: ignore[no-untyped-def]
+def above(near, j):
     """How far the point is in front of the plane of touching triangle j."""
     return -dot(row(near.corners, 3 * j), row(near.fronts, j))
 
 
 @inlined
-def lies_against(near, i, step, margin):  # type: ignore[no-untyped-def]
+def lies_against(near, i, step, margin):
     """Whether triangle i lies face to face on another one at the point: a box on its ground.
 
     A reversed twin of the same three corners does not count: that is one wall with two sides.
     """
     inward = row(near.inward, i)
     q = (step * inward[0], step * inward[1], step * inward[2])
-    for j in range(near.count):
+    for j in range(near.filled):
         if (
             dot(row(near.fronts, i), row(near.fronts, j)) < COPLANAR - 1.0
             and abs(above(near, j)) <= margin
@@ -90,14 +90,14 @@ def lies_against(near, i, step, margin):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def side_of(near, j, normal, step, margin, sides):  # type: ignore[no-untyped-def]
+def side_of(near, j, normal, step, margin, sides):
     """The side of triangle j that the point's own triangles lead to: 1, -1, or 0 where it is no matter.
 
     A step from the point into each of its own triangles, and a little up, ends in the space that the
     point is seen from.
     """
     front, vote = row(near.fronts, j), 0.0
-    for i in range(near.count):
+    for i in range(near.filled):
         if sides[i] == 1 and dot(row(near.fronts, i), normal) > OWN:
             along = dot(row(near.fronts, i), front)
             if abs(along) > 1.0 - COPLANAR and abs(above(near, j)) <= margin:
@@ -107,7 +107,7 @@ def side_of(near, j, normal, step, margin, sides):  # type: ignore[no-untyped-de
 
 
 @inlined
-def take_sides(near, normal, step, margin, sides):  # type: ignore[no-untyped-def]
+def take_sides(near, normal, step, margin, sides):
     """Fill sides (K,) with 1 or -1, the side of each triangle that the point is seen from; 0: no matter.
 
     The point's own triangles are those whose front looks along its normal; those that lie face to face
@@ -115,7 +115,7 @@ def take_sides(near, normal, step, margin, sides):  # type: ignore[no-untyped-de
     ENCLOSED where all of its own are.
     """
     own, hidden = 0, 0
-    for i in range(near.count):
+    for i in range(near.filled):
         sides[i] = 0
         if dot(row(near.fronts, i), normal) > OWN:
             own += 1
@@ -124,17 +124,17 @@ def take_sides(near, normal, step, margin, sides):  # type: ignore[no-untyped-de
                 hidden += 1
                 sides[i] = HIDDEN
     enclosed = own > 0 and hidden == own
-    for i in range(near.count):
+    for i in range(near.filled):
         if sides[i] == HIDDEN:
             sides[i] = 1 if enclosed else 0
-    for j in range(near.count):
+    for j in range(near.filled):
         if not dot(row(near.fronts, j), normal) > OWN:
             sides[j] = side_of(near, j, normal, step, margin, sides)
     return ENCLOSED if enclosed else CONTACT if hidden > 0 else PLAIN
 
 
 @inlined
-def direction_in_front(near, normal, sides):  # type: ignore[no-untyped-def]
+def direction_in_front(near, normal, sides):
     """(direction on the wanted side of all triangles, near the normal; its margin).
 
     The margin is the least cosine to a triangle's wanted side; not above 0 where there is no such
@@ -143,7 +143,7 @@ def direction_in_front(near, normal, sides):  # type: ignore[no-untyped-def]
     m, best, found = normal, -2.0, normal
     for _ in range(ROUNDS):
         margin, worst = 2.0, -1
-        for j in range(near.count):
+        for j in range(near.filled):
             if sides[j] != 0:
                 along = sides[j] * dot(m, row(near.fronts, j))
                 if along < margin:
@@ -162,9 +162,9 @@ def direction_in_front(near, normal, sides):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def room_ahead(near, direction, distance, margin):  # type: ignore[no-untyped-def]
+def room_ahead(near, direction, distance, margin):
     """At most `distance`, and at most half way to any triangle that lies across a gap."""
-    for j in range(near.count):
+    for j in range(near.filled):
         height = above(near, j)
         approach = dot(direction, row(near.fronts, j)) * (-1.0 if height > 0.0 else 1.0)
         gap = abs(height)
@@ -179,9 +179,7 @@ def scratch() -> tuple[object, ...]:
 
 
 @tight_kernel
-def place_origins(  # type: ignore[no-untyped-def]
-    functions, scene, world, positions, normals, scratch, origins, states
-):
+def place_origins(functions, scene, world, positions, normals, scratch, origins, states):
     """Put the origin of each point's rays, and say what was found around it.
 
     functions : (address of rtcPointQuery, address of the callback of contacts.py)
@@ -209,7 +207,7 @@ def place_origins(  # type: ignore[no-untyped-def]
             near = touching(ask, world, point, radius, buffers, near)
         states[p] = PLAIN
         direction, least = normal, 1.0
-        for j in range(near.count):
+        for j in range(near.filled):
             least = min(least, dot(normal, row(near.fronts, j)))
         if least < ORDINARY:
             rounding = 2.0 * ULP * largest + near.slack

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from aobake.tracing.conditioning import UnitFrame, shortest_edges, split_long_ed
 __all__ = ["Placement", "Triangles", "World", "build_world"]
 
 FloatArray = NDArray[np.float64]
+ScalarT = TypeVar("ScalarT", bound=np.generic)
 WorldArrays: TypeAlias = tuple[
     NDArray[np.float32], NDArray[np.uint32], NDArray[np.int64], NDArray[np.int64], int,
     NDArray[np.int64], FloatArray, FloatArray,
@@ -140,7 +141,7 @@ def _fixed_bodies(
     return bodies
 
 
-def _joined(arrays: list[NDArray]) -> NDArray:
+def _joined(arrays: list[NDArray[ScalarT]]) -> NDArray[ScalarT]:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 

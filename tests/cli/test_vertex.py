@@ -68,7 +68,7 @@ def test_the_report_says_what_was_read_written_and_traced(
     assert data["inputs"] == [{"path": str(corner), "sha256": digest}]
     assert data["outputs"][0]["sha256"] == hashlib.sha256(out.read_bytes()).hexdigest()
     assert data["settings"]["seed"] == 3
-    assert set(data["seconds"]) == {"read", "prepare", "build", "trace", "write"}
+    assert set(data["seconds"]) == {"read", "prepare", "build", "compile", "trace", "write"}
     assert data["points"] == 98
     assert 0 < data["rays"] <= 98 * 16
     assert 0.0 < data["error"]["rms"] <= data["error"]["max"]

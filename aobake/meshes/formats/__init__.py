@@ -34,8 +34,11 @@ class Reader(Protocol):
 class Writer(Protocol):
     """What a format module offers when it can hold ambient occlusion."""
 
-    def check(self, scene: Scene, store: StoreSettings) -> None:
-        """Raise OutputError now for what write would refuse, before a long bake."""
+    def check(self, scene: Scene, store: StoreSettings, target: Path) -> tuple[str, ...]:
+        """Raise OutputError now for what write would refuse, before a long bake.
+
+        Returns what the user should know about the result, one line each.
+        """
 
     def write(
         self, scene: Scene, ao: Sequence[NDArray[np.float32]], target: Path, store: StoreSettings
@@ -93,9 +96,12 @@ def load(path: str | Path, *, root: str | Path | None = None, scene: str | None 
     return found
 
 
-def check_target(scene: Scene, target: Path, store: StoreSettings) -> None:
-    """Raise OutputError now where write_vertex_ao would refuse the target, before a long bake."""
-    _writer(scene, target).check(scene, store)
+def check_target(scene: Scene, target: Path, store: StoreSettings) -> tuple[str, ...]:
+    """Raise OutputError now where write_vertex_ao would refuse the target, before a long bake.
+
+    Returns what the user should know about the result, one line each.
+    """
+    return _writer(scene, target).check(scene, store, target)
 
 
 def write_vertex_ao(

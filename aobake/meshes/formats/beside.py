@@ -8,7 +8,7 @@ from pathlib import Path
 from aobake.errors import InputError, OutputError
 from aobake.files import read_bytes, same_file
 
-__all__ = ["copies_beside"]
+__all__ = ["copies_beside", "make_folders"]
 
 
 def copies_beside(asset: Path, files: Iterable[Path], target: Path) -> dict[Path, bytes]:
@@ -37,7 +37,6 @@ def copies_beside(asset: Path, files: Iterable[Path], target: Path) -> dict[Path
                 "Move it, or write into another folder."
             )
         copies[copy] = content
-    _make_folders(copies, target)
     return copies
 
 
@@ -56,7 +55,8 @@ def _content(file: Path, asset: Path) -> bytes:
         raise OutputError(str(error)) from error
 
 
-def _make_folders(copies: Iterable[Path], target: Path) -> None:
+def make_folders(copies: Iterable[Path], target: Path) -> None:
+    """Make the folders that the copies go into. Raises OutputError."""
     for copy in copies:
         try:
             copy.parent.mkdir(parents=True, exist_ok=True)

@@ -26,22 +26,20 @@ from aobake.settings import StoreSettings
 __all__ = ["check", "write"]
 
 
-def check(scene: Scene, store: StoreSettings, target: Path | None = None) -> tuple[str, ...]:
+def check(scene: Scene, store: StoreSettings, target: Path) -> tuple[str, ...]:
     """Raise OutputError now for what write would refuse, before a long bake.
 
-    target : where it will be written, if that is known
     Returns what the caller should know about the result, one line each.
     """
-    source = _source(scene, target or Path("new.glb"))
+    source = _source(scene, target)
     chosen = chosen_store(store)
     places = touched_places(source)
     try:
         for place in places.values():
             chosen.check(place)
-        if target is not None:
-            plan_layout(source.document, target)
-            check_writable(target)
-            side_copies(source.document, source.document.json, target)
+        plan_layout(source.document, target)
+        check_writable(target)
+        side_copies(source.document, source.document.json, target)
     except InputError as error:
         raise OutputError(str(error)) from error
     return warnings_of(source, store, places)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aobake.errors import OutputError
 from aobake.files import write_files
-from aobake.meshes.formats.beside import copies_beside
+from aobake.meshes.formats.beside import copies_beside, make_folders
 from aobake.meshes.formats.merged import merged
 from aobake.meshes.formats.obj.fresh import document
 from aobake.meshes.formats.obj.geometry import vertex_values
@@ -23,8 +23,8 @@ from aobake.settings import StoreSettings
 __all__ = ["check", "patched", "write"]
 
 
-def check(scene: Scene, store: StoreSettings) -> None:
-    """Raise OutputError for a store that OBJ has no place for."""
+def check(scene: Scene, store: StoreSettings, target: Path) -> tuple[str, ...]:
+    """Raise OutputError for what OBJ has no place for, and for side files that are in the way."""
     if store.store != "color":
         raise OutputError(
             f'OBJ can hold vertex colors alone, not store "{store.store}". '
@@ -35,6 +35,9 @@ def check(scene: Scene, store: StoreSettings) -> None:
             f"{scene.source.path}: its free-form surfaces use weights (v x y z w), which a vertex color "
             "would displace. Write GLB or PLY instead (-o NAME.ply)."
         )
+    if isinstance(scene.source, ObjSource):
+        copies_beside(scene.source.path, scene.source.files[1:], target)
+    return ()
 
 
 def write(
@@ -46,7 +49,7 @@ def write(
     Returns the files written, the target first, then material libraries and textures copied beside it.
     Raises OutputError; nothing is half-written.
     """
-    check(scene, store)
+    check(scene, store, target)
     if not isinstance(scene.source, ObjSource):
         write_files({target: document(merged(scene, ao))})
         return (target,)
@@ -56,6 +59,7 @@ def write(
         )
     text = patched(scene.source.text, ao[0], str(target))
     copies = copies_beside(scene.source.path, scene.source.files[1:], target)
+    make_folders(copies, target)
     write_files({**copies, target: text})
     return (target, *copies)
 

@@ -20,13 +20,14 @@ from aobake.settings import StoreSettings
 __all__ = ["check", "write"]
 
 
-def check(scene: Scene, store: StoreSettings) -> None:  # noqa: ARG001 - Writer
+def check(scene: Scene, store: StoreSettings, target: Path) -> tuple[str, ...]:  # noqa: ARG001 - Writer
     """Raise OutputError for a store that PLY has no place for."""
     if store.store == "occlusion":
         raise OutputError(
             'PLY has no occlusion texture, which store "occlusion" needs. '
             "Use --store color or --store attribute, or write GLB (-o NAME.glb)."
         )
+    return ()
 
 
 def write(
@@ -38,7 +39,7 @@ def write(
     store : "color" gives red, green, blue and ao; "attribute" gives ao alone
     Returns the target. Raises OutputError; nothing is half-written.
     """
-    check(scene, store)
+    check(scene, store, target)
     if not isinstance(scene.source, PlySource):
         write_files({target: document(merged(scene, ao), store)})
         return (target,)

@@ -130,8 +130,8 @@ def test_colours_that_are_no_colours_are_refused_before_the_bake(tmp_path: Path)
     builder.show(builder.node(mesh=builder.mesh(builder.primitive(attributes={"COLOR_0": number}))))
     scene = load(builder.glb(tmp_path / "a.glb"))
     with pytest.raises(OutputError, match=r"COLOR_0 is int16.*--store attribute"):
-        gltf.check(scene, StoreSettings())
-    assert gltf.check(scene, StoreSettings(store="attribute")) == ()
+        gltf.check(scene, StoreSettings(), tmp_path / "out.glb")
+    assert gltf.check(scene, StoreSettings(store="attribute"), tmp_path / "out.glb") == ()
 
 
 def test_colours_that_are_too_few_are_refused_before_the_bake(tmp_path: Path) -> None:
@@ -139,7 +139,7 @@ def test_colours_that_are_too_few_are_refused_before_the_bake(tmp_path: Path) ->
     colors = {"COLOR_0": builder.accessor([[1, 1, 1]] * 3)}
     builder.show(builder.node(mesh=builder.mesh(builder.primitive(attributes=colors))))
     with pytest.raises(OutputError, match="COLOR_0 has 3 values for 4 vertices"):
-        gltf.check(load(builder.glb(tmp_path / "a.glb")), StoreSettings())
+        gltf.check(load(builder.glb(tmp_path / "a.glb")), StoreSettings(), tmp_path / "out.glb")
 
 
 def test_the_attribute_holds_the_values_exactly(tmp_path: Path) -> None:
@@ -213,7 +213,7 @@ def test_an_occlusion_texture_shows_the_values_through_its_own_set(tmp_path: Pat
     # Half a step of 16 bits, stretched by 256 / 255.
     np.testing.assert_allclose(sampled(image, found[:, 0]), values[0], rtol=0, atol=0.6 / 65535)
     np.testing.assert_allclose(found[:, 1], 0.5, atol=1e-4)
-    warnings = gltf.check(load(source), StoreSettings(store="occlusion"))
+    warnings = gltf.check(load(source), StoreSettings(store="occlusion"), tmp_path / "out.glb")
     assert len(warnings) == 1
     assert 'material 0 "wood" has an occlusion texture, which is replaced' in warnings[0]
 
@@ -290,7 +290,7 @@ def test_a_primitive_with_eight_sets_of_coordinates_is_refused(tmp_path: Path) -
     builder.show(builder.node(mesh=builder.mesh(builder.primitive(attributes=sets))))
     scene = load(builder.glb(tmp_path / "a.glb"))
     with pytest.raises(OutputError, match=r"8 texture coordinate sets already.*--store color"):
-        gltf.check(scene, StoreSettings(store="occlusion"))
+        gltf.check(scene, StoreSettings(store="occlusion"), tmp_path / "out.glb")
 
 
 def three_nodes(tmp_path: Path, *, hidden: bool = False) -> Path:
@@ -338,7 +338,7 @@ def test_gpu_instances_share_their_mean_and_say_so(tmp_path: Path) -> None:
     source = builder.glb(tmp_path / "a.glb")
     bake(source, tmp_path / "b.glb", "attribute", constant(0.25, 0.75))
     np.testing.assert_array_equal(attribute(tmp_path / "b.glb", "_AO"), [[0.5]] * 4)
-    (warning,) = gltf.check(load(source), StoreSettings())
+    (warning,) = gltf.check(load(source), StoreSettings(), tmp_path / "out.glb")
     assert '"grass"' in warning
     assert "mean" in warning
 
