@@ -33,12 +33,11 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A scene made ready: a surface per mesh, where instances stand, the built world, the lowest point."""
+    """A scene made ready: a surface per mesh, where instances stand, the built world."""
 
     surfaces: Sequence[Surface]
     placed: Sequence[tuple[Instance, Surface] | None]
     world: World
-    lowest: FloatArray
 
 
 def bake_vertices(
@@ -63,7 +62,7 @@ def bake_vertices(
     with _timed(seconds, "build"):
         prepared = build(scene, surfaces, settings)
         points = vertex_points(scene, prepared)
-    request = _request(prepared, points, settings)
+    request = _request(scene, prepared, points, settings)
     with _timed(seconds, "compile"):
         if progress is not None:
             progress("compile", 0, 1)
@@ -122,7 +121,7 @@ def visibility(
         numbers=chosen,
     )
     prepared = build(scene, surfaces_of(scene), settings)
-    found = estimate(prepared.world, _request(prepared, points, settings), settings)
+    found = estimate(prepared.world, _request(scene, prepared, points, settings), settings)
     mean, error = np.ones(len(at), np.float32), np.zeros(len(at), np.float32)
     rays = np.zeros(len(at), np.int32)
     mean[chosen], error[chosen], rays[chosen] = found.mean, found.standard_error, found.rays
@@ -159,7 +158,6 @@ def build(scene: Scene, surfaces: Sequence[Surface], settings: BakeSettings) -> 
     triangles: list[Triangles] = []
     placements: list[Placement] = []
     placed: list[tuple[Instance, Surface] | None] = []
-    lowest = np.full(3, np.inf)
     for instance, mesh in scene.placed():
         transform, surface = instance.transform[:3], surfaces[instance.mesh]
         if not np.isfinite(transform).all():
@@ -176,9 +174,7 @@ def build(scene: Scene, surfaces: Sequence[Surface], settings: BakeSettings) -> 
             )
         if len(surface.faces):
             placements.append(Placement(parts[key], transform))
-            used = mesh.vertices[np.unique(surface.faces)]
-            lowest = np.minimum(lowest, (used @ transform[:, :3].T + transform[:, 3]).min(axis=0))
-    return Prepared(surfaces, placed, build_world(triangles, placements), lowest)
+    return Prepared(surfaces, placed, build_world(triangles, placements))
 
 
 def _hit_filter(scene: Scene, material: int | None, settings: BakeSettings) -> int:
@@ -223,19 +219,31 @@ def _turned_normals(normals: FloatArray, linear: FloatArray) -> FloatArray:
     return unit_rows(sign * normals @ cofactors.T)
 
 
-def _request(prepared: Prepared, points: SurfacePoints, settings: BakeSettings) -> Request:
+def _request(
+    scene: Scene, prepared: Prepared, points: SurfacePoints, settings: BakeSettings
+) -> Request:
     """The points as the tracer wants them, over the ground where one is asked for."""
-    ground = None
-    if settings.ground is not None:
-        lowest = float(prepared.lowest["xyz".index(settings.ground[1])])
-        ground = lowest if np.isfinite(lowest) else None
     return Request(
         positions=points.positions,
         normals=points.normals,
         geometric=points.geometric,
         numbers=points.numbers,
-        ground=ground,
+        ground=_lowest(scene, prepared, settings),
     )
+
+
+def _lowest(scene: Scene, prepared: Prepared, settings: BakeSettings) -> float | None:
+    """The height of the lowest surface along the axis of the ground; None where there is no ground."""
+    if settings.ground is None:
+        return None
+    axis = "xyz".index(settings.ground[1])
+    lowest = np.inf
+    for (_, mesh), stands in zip(scene.placed(), prepared.placed, strict=True):
+        if stands is not None and len(stands[1].faces):
+            used = mesh.vertices[np.unique(stands[1].faces)]
+            row = stands[0].transform[axis]
+            lowest = min(lowest, float((used @ row[:3]).min()) + float(row[3]))
+    return lowest if np.isfinite(lowest) else None
 
 
 def _per_instance(

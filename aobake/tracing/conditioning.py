@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.tracing.compiled import kernel
+from aobake.tracing.compiled import tight_kernel
+from aobake.tracing.vectors import length, minus, row
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -85,19 +86,16 @@ def shortest_edges(vertices: FloatArray, faces: FaceArray) -> FloatArray:
     return shortest
 
 
-@kernel
+@tight_kernel
 def shorten(vertices, faces, shortest):
     """Lower shortest (V,) to the length of the shortest edge at each vertex."""
     for f in range(len(faces)):
         for k in range(3):
             i, j = faces[f, k], faces[f, (k + 1) % 3]
-            x = vertices[i, 0] - vertices[j, 0]
-            y = vertices[i, 1] - vertices[j, 1]
-            z = vertices[i, 2] - vertices[j, 2]
-            length = np.sqrt(x * x + y * y + z * z)
-            if length > 0.0:
-                shortest[i] = min(shortest[i], length)
-                shortest[j] = min(shortest[j], length)
+            size = length(minus(row(vertices, i), row(vertices, j)))
+            if size > 0.0:
+                shortest[i] = min(shortest[i], size)
+                shortest[j] = min(shortest[j], size)
 
 
 def split_long_edges(
@@ -159,10 +157,17 @@ def split_long_edges(
 def _longest_edges(vertices: FloatArray, faces: FaceArray) -> FloatArray:
     """(F,) length of the longest edge of each face."""
     longest = np.zeros(len(faces))
-    for k in range(3):
-        side = vertices[faces[:, (k + 1) % 3]] - vertices[faces[:, k]]
-        np.maximum(longest, np.einsum("ij,ij->i", side, side), out=longest)
-    return np.sqrt(longest, out=longest)
+    lengthen(vertices, faces, longest)
+    return longest
+
+
+@tight_kernel
+def lengthen(vertices, faces, longest):
+    """Raise longest (F,) to the length of the longest edge of each face."""
+    for f in range(len(faces)):
+        for k in range(3):
+            a, b = row(vertices, faces[f, k]), row(vertices, faces[f, (k + 1) % 3])
+            longest[f] = max(longest[f], length(minus(a, b)))
 
 
 def _levels_of_detail(
@@ -185,10 +190,10 @@ def _cuts(a: FloatArray, b: FloatArray, levels: list[tuple[float, cKDTree]]) -> 
     An edge that is close to detail with one end loses as much there as can stay whole, so that a few
     cuts in growing steps do; any other is halved.
     """
-    length = np.linalg.norm(b - a, axis=1)
+    size_of_edge = np.linalg.norm(b - a, axis=1)
     where = np.zeros(len(a))
     for size, tree in levels:
-        long = np.flatnonzero((where == 0.0) & (length > FINEST * size))
+        long = np.flatnonzero((where == 0.0) & (size_of_edge > FINEST * size))
         if len(long) == 0:
             continue
         # Five points along the edge find whatever lies beside it to an eighth of its length.
@@ -196,9 +201,9 @@ def _cuts(a: FloatArray, b: FloatArray, levels: list[tuple[float, cKDTree]]) -> 
         samples = (1.0 - along) * a[long] + along * b[long]
         distance = tree.query(samples)[0]
         allowed = FINEST * size + NEAR * distance.min(axis=0)
-        kept = SHORTER * (FINEST * size + NEAR * distance[[0, -1]]) / length[long]
+        kept = SHORTER * (FINEST * size + NEAR * distance[[0, -1]]) / size_of_edge[long]
         share = np.where(kept[0] < 0.5, kept[0], np.where(kept[1] < 0.5, 1.0 - kept[1], 0.5))
-        where[long] = np.where(length[long] > allowed, share, 0.0)
+        where[long] = np.where(size_of_edge[long] > allowed, share, 0.0)
     return where
 
 
@@ -218,10 +223,10 @@ def _cut_needles_evenly(
     A needle with one long edge cut falls into a needle and a sliver with an angle near 180 degrees,
     whose plane float32 cannot tell.
     """
-    length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)[of_face]
-    longest = length.max(axis=1)
-    long = length > 0.5 * longest[:, None]
-    needles = np.flatnonzero((length.min(axis=1) < NEEDLE * longest) & (long.sum(axis=1) == 2))
+    sides = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)[of_face]
+    longest = sides.max(axis=1)
+    long = sides > 0.5 * longest[:, None]
+    needles = np.flatnonzero((sides.min(axis=1) < NEEDLE * longest) & (long.sum(axis=1) == 2))
     pairs = of_face[needles][long[needles]].reshape(-1, 2)
     # Both edges of a pair start or end at the same corner, but may be stored from it or towards it.
     same_way = (edges[pairs[:, 0], 0] == edges[pairs[:, 1], 0]) | (

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aobake.tracing import embree
+from aobake.tracing import embree, kernels
 from aobake.tracing.compiled import aligned, kernel
 from aobake.tracing.contacts import note_triangle
-from aobake.tracing.kernels import call_packet
 from aobake.tracing.origins import place_origins, scratch
 from aobake.tracing.sampling import direction_sets
 from aobake.tracing.world import Placement, Triangles, World, build_world
@@ -19,6 +19,8 @@ from tests import scenes
 from tests.scenes import FloatArray
 
 BITS = 2**64 - 1
+
+call_packet: Callable[..., None] = kernels.call_packet
 
 
 def mixed_bits(seed: int, index: int) -> int:
@@ -47,7 +49,7 @@ def directions_of(seed: int, index: int, normal: ArrayLike, rays: int) -> FloatA
     angle = (bits >> 11) * (2.0 * math.pi / 2.0**53)
     c, s = math.cos(angle), math.sin(angle)
     frame = np.stack([c * tangent + s * bitangent, c * bitangent - s * tangent, (x, y, z)])
-    return local @ frame
+    return np.asarray(local @ frame)
 
 
 def brute_force(
