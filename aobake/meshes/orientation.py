@@ -41,7 +41,7 @@ def _neighbours(
     a = faces.reshape(-1)
     b = np.roll(faces, -1, axis=1).reshape(-1)
     key = np.minimum(a, b) << 32 | np.maximum(a, b)
-    order = np.argsort(key, kind="stable")
+    order = np.argsort(key)
     ordered = key[order]
     starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]]) if len(ordered) else order
     counts = np.diff(np.r_[starts, len(ordered)])
