@@ -21,8 +21,9 @@ from aobake.points import SurfacePoints
 from aobake.results import BakedVertices, Estimate
 from aobake.settings import BakeSettings
 from aobake.tracing.backfaces import pass_through_backfaces
+from aobake.tracing.conditioning import detail_beside, regions
 from aobake.tracing.estimate import Estimates, Request, compile_kernels, estimate
-from aobake.tracing.origins import CONTACT, DOUBTFUL, ENCLOSED, THIN
+from aobake.tracing.origins import CONTACT, DOUBTFUL, ENCLOSED, THIN, UNRESOLVED
 from aobake.tracing.world import Placement, Triangles, World, build_world
 
 __all__ = ["bake_vertices", "build", "surfaces_of", "vertex_points", "visibility"]
@@ -30,12 +31,18 @@ __all__ = ["bake_vertices", "build", "surfaces_of", "vertex_points", "visibility
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
+INSTANCED = (
+    1.0 / 8.0
+)  # detail that float32 resolves on an instance: its transform errs by 8 half-ulps
+
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """A scene made ready: a surface per mesh, where instances stand, the built world."""
 
     surfaces: Sequence[Surface]
+    parts: Sequence[Triangles]
+    placements: Sequence[Placement]
     placed: Sequence[tuple[Instance, Surface] | None]
     world: World
 
@@ -62,14 +69,14 @@ def bake_vertices(
     with _timed(seconds, "build"):
         prepared = build(scene, surfaces, settings)
         points = vertex_points(scene, prepared)
-    request = _request(scene, prepared, points, settings)
+    ground = _lowest(scene, prepared, settings)
     with _timed(seconds, "compile"):
         if progress is not None:
             progress("compile", 0, 1)
-        compile_kernels(prepared.world, request, settings)
+        compile_kernels(prepared.world, _request(points, ground), settings)
     with _timed(seconds, "trace"):
         report = None if progress is None else partial(progress, "trace")
-        found = estimate(prepared.world, request, settings, report)
+        found = _traced(prepared, points, ground, settings, report)
     ao, error = _per_instance(scene, prepared, found)
     found_out = _findings(scene, prepared, found)
     if settings.strict:
@@ -114,14 +121,15 @@ def visibility(
     if above is not None:
         usable &= above.any(axis=1)
     chosen = np.flatnonzero(usable)
+    prepared = build(scene, surfaces_of(scene), settings)
     points = SurfacePoints(
         positions=at[chosen],
         normals=around[chosen],
         geometric=None if above is None else above[chosen],
+        detail=_detail_at(at[chosen], scene, prepared),
         numbers=chosen,
     )
-    prepared = build(scene, surfaces_of(scene), settings)
-    found = estimate(prepared.world, _request(scene, prepared, points, settings), settings)
+    found = _traced(prepared, points, _lowest(scene, prepared, settings), settings, None)
     mean, error = np.ones(len(at), np.float32), np.zeros(len(at), np.float32)
     rays = np.zeros(len(at), np.int32)
     mean[chosen], error[chosen], rays[chosen] = found.mean, found.standard_error, found.rays
@@ -174,7 +182,8 @@ def build(scene: Scene, surfaces: Sequence[Surface], settings: BakeSettings) -> 
             )
         if len(surface.faces):
             placements.append(Placement(parts[key], transform))
-    return Prepared(surfaces, placed, build_world(triangles, placements))
+    world = build_world(triangles, placements)
+    return Prepared(surfaces, triangles, placements, placed, world)
 
 
 def _hit_filter(scene: Scene, material: int | None, settings: BakeSettings) -> int:
@@ -184,21 +193,43 @@ def _hit_filter(scene: Scene, material: int | None, settings: BakeSettings) -> i
 
 def vertex_points(scene: Scene, prepared: Prepared) -> SurfacePoints:
     """The vertices to trace from, instance by instance; numbered as they stand in the whole scene."""
-    positions, normals, numbers = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, np.int64)]
+    parts = [_no_points()]
+    uses = np.bincount([i.mesh for i in scene.instances], minlength=len(scene.meshes))
     first = 0
     for (instance, mesh), stands in zip(scene.placed(), prepared.placed, strict=True):
         if stands is not None:
-            asked = np.flatnonzero(_asked(instance, stands[1]))
+            asked = np.flatnonzero(_asked(*stands))
             linear, shift = instance.transform[:3, :3], instance.transform[:3, 3]
-            positions.append(mesh.vertices[asked] @ linear.T + shift)
-            normals.append(_turned_normals(stands[1].normals[asked], linear))
-            numbers.append(asked + first)
+            stretch = float(np.abs(linear).sum(axis=1).max())
+            if uses[instance.mesh] > 1:
+                stretch *= INSTANCED
+            parts.append(
+                SurfacePoints(
+                    positions=mesh.vertices[asked] @ linear.T + shift,
+                    normals=_turned_normals(stands[1].normals[asked], linear),
+                    geometric=None,
+                    detail=stretch * stands[1].detail[asked],
+                    numbers=asked + first,
+                )
+            )
         first += len(mesh.vertices)
     return SurfacePoints(
-        positions=np.concatenate(positions),
-        normals=np.concatenate(normals),
+        positions=np.concatenate([part.positions for part in parts]),
+        normals=np.concatenate([part.normals for part in parts]),
         geometric=None,
-        numbers=np.concatenate(numbers),
+        detail=np.concatenate([part.detail for part in parts]),
+        numbers=np.concatenate([part.numbers for part in parts]),
+    )
+
+
+def _no_points() -> SurfacePoints:
+    nothing = np.zeros((0, 3))
+    return SurfacePoints(
+        positions=nothing,
+        normals=nothing,
+        geometric=None,
+        detail=np.zeros(0),
+        numbers=np.zeros(0, np.int64),
     )
 
 
@@ -219,17 +250,55 @@ def _turned_normals(normals: FloatArray, linear: FloatArray) -> FloatArray:
     return unit_rows(sign * normals @ cofactors.T)
 
 
-def _request(
-    scene: Scene, prepared: Prepared, points: SurfacePoints, settings: BakeSettings
-) -> Request:
-    """The points as the tracer wants them, over the ground where one is asked for."""
+def _request(points: SurfacePoints, ground: float | None) -> Request:
+    """The points as the tracer wants them."""
     return Request(
         positions=points.positions,
         normals=points.normals,
         geometric=points.geometric,
         numbers=points.numbers,
-        ground=_lowest(scene, prepared, settings),
+        ground=ground,
     )
+
+
+def _detail_at(positions: FloatArray, scene: Scene, prepared: Prepared) -> FloatArray:
+    """The detail around points: that of the nearest vertex where float32 might not resolve it, else any."""
+    vertices = vertex_points(scene, prepared)
+    found, _ = regions(vertices.positions, vertices.detail, prepared.world.frame)
+    if len(found) == 1:
+        return np.full(len(positions), np.inf)
+    return detail_beside(positions, vertices.positions, vertices.detail)
+
+
+def _traced(
+    prepared: Prepared,
+    points: SurfacePoints,
+    ground: float | None,
+    settings: BakeSettings,
+    progress: Callable[[int, int], None] | None,
+) -> Estimates:
+    """Estimates at all points: in one world for what float32 resolves there, in further ones for the rest."""
+    found, unresolved = regions(points.positions, points.detail, prepared.world.frame)
+    if len(found) == 1:
+        return estimate(prepared.world, _request(points, ground), settings, progress)
+    result = Estimates.blank(len(points))
+    done = 0
+    for center, chosen in found:
+        world = prepared.world
+        if center is not None:
+            world = build_world(prepared.parts, prepared.placements, center)
+        before = done
+
+        def report(some: int, _: int, before: int = before) -> None:
+            if progress is not None:
+                progress(before + some, len(points))
+
+        part = estimate(world, _request(points.only(chosen), ground), settings, report)
+        result.mean[chosen], result.standard_error[chosen] = part.mean, part.standard_error
+        result.rays[chosen], result.states[chosen] = part.rays, part.states
+        done += len(chosen)
+    result.states[unresolved] = UNRESOLVED
+    return result
 
 
 def _lowest(scene: Scene, prepared: Prepared, settings: BakeSettings) -> float | None:
@@ -273,6 +342,7 @@ def _findings(scene: Scene, prepared: Prepared, found: Estimates) -> tuple[Findi
     kinds: dict[FindingKind, int] = {
         "contact": CONTACT,
         "thin": THIN,
+        "unresolved": UNRESOLVED,
         "doubtful": DOUBTFUL,
         "enclosed": ENCLOSED,
     }

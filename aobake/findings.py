@@ -16,6 +16,7 @@ FindingKind = Literal[
     "no-normal",
     "contact",
     "thin",
+    "unresolved",
     "doubtful",
     "enclosed",
 ]
@@ -30,6 +31,7 @@ _SENTENCES: dict[FindingKind, str] = {
     "no-normal": "vertices have no normal that could be told and were left open (1)",
     "contact": "points lie where a surface rests on another one; what is hidden there was left out",
     "thin": "points face a gap thinner than float32 resolves there; half of it was kept clear",
+    "unresolved": "points lie too far from the others for their detail, even with frames of their own",
     "doubtful": "points have no side that is in front of all the surfaces around them",
     "enclosed": "points lie face to face on another surface and came out as closed (0)",
 }

@@ -17,6 +17,7 @@ from aobake.meshes.normals import CREASE_DEGREES, computed_normals, unit_rows
 from aobake.meshes.orientation import consistent_winding
 from aobake.meshes.scene import Mesh
 from aobake.tracing.compiled import tight_kernel
+from aobake.tracing.conditioning import detail_at_vertices
 from aobake.tracing.vectors import cross, dot, largest, length, minus, row, scaled
 
 __all__ = ["Surface", "findings", "surface_of"]
@@ -33,6 +34,7 @@ class Surface:
     asked : (V,) bool, the vertices to trace from: used by a face, finite, with a normal, and the first
         of those that have the same place and the same normal
     same_as : (V,) int64, the vertex whose value each one takes
+    detail : (V,) float64, the size of the smallest face at each vertex
     findings : what was passed over, mended or is in doubt
     """
 
@@ -40,6 +42,7 @@ class Surface:
     normals: FloatArray
     asked: NDArray[np.bool_]
     same_as: NDArray[np.int64]
+    detail: FloatArray
     findings: tuple[Finding, ...]
 
 
@@ -72,6 +75,7 @@ def surface_of(mesh: Mesh, name: str = "") -> Surface:
         normals=normals,
         asked=asked & (same_as == np.arange(len(vertices))),
         same_as=same_as,
+        detail=detail_at_vertices(clean, faces),
         findings=findings(name, found),
     )
 

@@ -20,11 +20,22 @@ from aobake.tracing.vectors import length, minus, row
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-__all__ = ["UnitFrame", "shortest_edges", "split_long_edges", "unit_frame"]
+__all__ = [
+    "UnitFrame",
+    "detail_at_vertices",
+    "detail_beside",
+    "regions",
+    "split_long_edges",
+    "unit_frame",
+]
 
 FloatArray = NDArray[np.float64]
 FaceArray = NDArray[np.uint32]
 
+RESOLVING_ULPS = (
+    64.0  # at a tenth of it values were off by 0.3, at ten times it by 0.007 at the most
+)
+MOST_REGIONS = 64  # frames besides the first; each costs a tree
 MOST_SAMPLED = 1 << 16  # vertices of one part that the middle is taken from
 FINEST = 8192.0  # an edge may be this many times as long as the detail beside it: AO errs by 1e-4
 NEAR = (
@@ -52,17 +63,19 @@ class UnitFrame:
         return (points - self.center) * self.scale
 
 
-def unit_frame(parts: Sequence[FloatArray]) -> UnitFrame:
+def unit_frame(parts: Sequence[FloatArray], center: FloatArray | None = None) -> UnitFrame:
     """The frame of several (N, 3) clouds of finite points; the identity for none.
 
-    The centre is the median of the points, not the middle of their bounding box: float32 is densest
-    around it, and that is where the detail should be. A ground as wide as a city hardly moves it.
+    The centre, where none is given, is the median of the points, not the middle of their bounding box:
+    float32 is densest around it, and that is where the detail should be. A ground as wide as a city
+    hardly moves it.
     """
     filled = [part for part in parts if len(part)]
     if not filled:
         return UnitFrame(np.zeros(3), 1.0)
-    sampled = [part[:: max(1, len(part) // MOST_SAMPLED)] for part in filled]
-    center = np.median(np.concatenate(sampled), axis=0)
+    if center is None:
+        sampled = [part[:: max(1, len(part) // MOST_SAMPLED)] for part in filled]
+        center = np.median(np.concatenate(sampled), axis=0)
     reach = max(
         max(
             float(np.abs(part.max(axis=0) - center).max()),
@@ -76,26 +89,63 @@ def unit_frame(parts: Sequence[FloatArray]) -> UnitFrame:
     return UnitFrame(center, math.ldexp(1.0, max(-1000, min(1000, -exponent))))
 
 
-def shortest_edges(vertices: FloatArray, faces: FaceArray) -> FloatArray:
-    """(V,) float64, the shortest edge of any face at each vertex; infinite where there is none.
+def detail_at_vertices(vertices: FloatArray, faces: FaceArray) -> FloatArray:
+    """(V,) float64, the size of the smallest face at each vertex: its longest edge; infinite where none is.
 
-    Edges of length 0 are passed over: they have no size that anything could be fine against.
+    Not the shortest edge: a sliver is not detail, and scans are full of slivers.
     """
-    shortest = np.full(len(vertices), np.inf)
-    shorten(vertices, faces, shortest)
-    return shortest
+    detail = np.full(len(vertices), np.inf)
+    _refine(faces, _longest_edges(vertices, faces), detail)
+    return detail
 
 
 @tight_kernel
-def shorten(vertices, faces, shortest):
-    """Lower shortest (V,) to the length of the shortest edge at each vertex."""
+def _refine(faces, longest, detail):
+    """Lower detail (V,) to the size of the smallest face at each vertex."""
     for f in range(len(faces)):
-        for k in range(3):
-            i, j = faces[f, k], faces[f, (k + 1) % 3]
-            size = length(minus(row(vertices, i), row(vertices, j)))
-            if size > 0.0:
-                shortest[i] = min(shortest[i], size)
-                shortest[j] = min(shortest[j], size)
+        if longest[f] > 0.0:
+            for k in range(3):
+                detail[faces[f, k]] = min(detail[faces[f, k]], longest[f])
+
+
+def detail_beside(points: FloatArray, vertices: FloatArray, detail: FloatArray) -> FloatArray:
+    """(P,) the detail of the vertex that is nearest to each point; both arrays as for the others."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(detail[cKDTree(vertices).query(points)[1]])
+
+
+def regions(
+    points: FloatArray, detail: FloatArray, frame: UnitFrame
+) -> tuple[list[tuple[FloatArray | None, NDArray[np.int64]]], NDArray[np.int64]]:
+    """Which points can be asked for in the frame, and which need one around a centre of their own.
+
+    float32 resolves detail down to RESOLVING_ULPS ulps of the distance from a frame's centre. Points
+    that are too far away for their detail are gathered around the first of them, and so on: a few small
+    things that stand far apart get a frame each.
+
+    points : (P, 3) float64, in the scene's space
+    detail : (P,) float64, the size of what is to be told apart at each of them
+    Returns (centre, or None for the frame as it is; the numbers of its points), and the numbers of
+    points that are left unresolved after MOST_REGIONS, which are in the first region.
+    """
+    lacking = np.flatnonzero(~_resolved(points, detail, frame.center))
+    others: list[tuple[FloatArray | None, NDArray[np.int64]]] = []
+    while len(lacking) and len(others) < MOST_REGIONS:
+        center = points[lacking[0]]
+        near = _resolved(points[lacking], detail[lacking], center)
+        near[0] = True
+        others.append((center, lacking[near]))
+        lacking = lacking[~near]
+    elsewhere = np.zeros(len(points), bool)
+    for _, chosen in others:
+        elsewhere[chosen] = True
+    return [(None, np.flatnonzero(~elsewhere)), *others], lacking
+
+
+def _resolved(points: FloatArray, detail: FloatArray, center: FloatArray) -> NDArray[np.bool_]:
+    distance = np.abs(points - center).max(axis=1, initial=0.0)
+    return np.asarray(detail >= RESOLVING_ULPS * 2.0**-23 * distance, bool)
 
 
 def split_long_edges(
@@ -112,8 +162,8 @@ def split_long_edges(
     triangles of an edge cut it at the same point, so that no crack opens.
 
     vertices, faces : (V, 3) float64, (F, 3) uint32
-    details, sizes : arrays (D, 3) and (D,) float64: points that will be asked for, and the length of
-        the shortest edge at each of them
+    details, sizes : arrays (D, 3) and (D,) float64: points that will be asked for, and the size of the
+        detail at each of them
     Returns the vertices with the new ones behind them, and the faces; the same arrays if nothing is
     too large. At most 2 F + SPARE_FACES faces come of it.
     """

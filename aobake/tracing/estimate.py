@@ -92,8 +92,10 @@ def compile_kernels(world: World, request: Request, settings: BakeSettings) -> N
 
     There an interrupt ends it; threads that compile at once would wait for each other.
     """
-    nothing = Estimates.blank(0)
-    _block(world, request, settings, slice(0, 0), nothing)
+    nowhere = slice(0, 0)
+    _block(world, request, settings, nowhere, Estimates.blank(0))
+    no_origins, no_points = np.zeros((0, 3), np.float32), np.zeros(0, np.int64)
+    _trace(world, request, settings, nowhere, no_origins, no_points, rays=1, number=0)
 
 
 def estimate(

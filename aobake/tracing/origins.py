@@ -25,13 +25,23 @@ from aobake.tracing.compiled import inlined, tight_kernel
 from aobake.tracing.contacts import MOST_TOUCHING, new_touching, query_buffers, touching
 from aobake.tracing.vectors import cross, dot, length, minus, row
 
-__all__ = ["CONTACT", "DOUBTFUL", "ENCLOSED", "PLAIN", "THIN", "place_origins", "scratch"]
+__all__ = [
+    "CONTACT",
+    "DOUBTFUL",
+    "ENCLOSED",
+    "PLAIN",
+    "THIN",
+    "UNRESOLVED",
+    "place_origins",
+    "scratch",
+]
 
-PLAIN, CONTACT, THIN, DOUBTFUL, ENCLOSED = 0, 1, 2, 3, 4  # what was found about a point
+# what was found about a point; UNRESOLVED is found where frames are chosen
+PLAIN, CONTACT, THIN, DOUBTFUL, ENCLOSED, UNRESOLVED = 0, 1, 2, 3, 4, 5
 
 ULP = 2.0**-23  # of a float32 in [1, 2); half of it below
 SEARCH_ULPS = 32.0  # radius of what counts as touching, in ulps of the point's largest coordinate
-SMALLEST = 1e-6  # coordinates below this are as good as 0
+SMALLEST = 1e-20  # coordinates below this are as good as 0
 ORDINARY = 0.3  # a normal at least this much in front of every triangle needs no further thought
 OWN = 0.02  # a triangle is the point's own if its front looks along the normal at least this much
 LIFT = 0.1  # how steeply a step from the point into its own triangle's front side rises

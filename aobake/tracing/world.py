@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.tracing import embree
-from aobake.tracing.conditioning import UnitFrame, shortest_edges, split_long_edges, unit_frame
+from aobake.tracing.conditioning import UnitFrame, detail_at_vertices, split_long_edges, unit_frame
 
 __all__ = ["Placement", "Triangles", "World", "build_world"]
 
@@ -76,13 +76,19 @@ class _Body:
     hit_filter: int
 
 
-def build_world(parts: Sequence[Triangles], placements: Sequence[Placement]) -> World:
-    """Condition and build what stands in a scene. Raises EngineError."""
+def build_world(
+    parts: Sequence[Triangles], placements: Sequence[Placement], center: FloatArray | None = None
+) -> World:
+    """Condition and build what stands in a scene. Raises EngineError.
+
+    center : (3,) float64, where coordinates are to be finest; None: amid the vertices
+    """
     uses = np.bincount([p.part for p in placements], minlength=len(parts))
     instanced = [bool(uses[p.part] > 1 and _invertible(p.transform)) for p in placements]
     fixed = [p for p, shared in zip(placements, instanced, strict=True) if not shared]
     moving = [p for p, shared in zip(placements, instanced, strict=True) if shared]
-    frame = unit_frame([_place(p.transform, _spread(parts[p.part])) for p in placements])
+    clouds = [_place(p.transform, _spread(parts[p.part])) for p in placements]
+    frame = unit_frame(clouds, center)
     bodies = _fixed_bodies(parts, fixed, moving, frame)
     kept = sorted({p.part for p in moving})
     frames = {number: unit_frame([_spread(parts[number])]) for number in kept}
@@ -123,7 +129,7 @@ def _fixed_bodies(
     """One body per filter, of all that stands where it is, with large triangles split."""
     placed = [frame.apply(_place(p.transform, parts[p.part].vertices)) for p in [*fixed, *moving]]
     sizes = [
-        shortest_edges(at, parts[p.part].faces)
+        detail_at_vertices(at, parts[p.part].faces)
         for at, p in zip(placed, [*fixed, *moving], strict=True)
     ]
     details = [at[np.isfinite(size)] for at, size in zip(placed, sizes, strict=True)]
