@@ -194,7 +194,9 @@ def _hit_filter(scene: Scene, material: int | None, settings: BakeSettings) -> i
 def vertex_points(scene: Scene, prepared: Prepared) -> SurfacePoints:
     """The vertices to trace from, instance by instance; numbered as they stand in the whole scene."""
     parts = [_no_points()]
-    uses = np.bincount([i.mesh for i in scene.instances], minlength=len(scene.meshes))
+    uses = np.bincount(
+        np.array([i.mesh for i in scene.instances], np.int64), minlength=len(scene.meshes)
+    )
     first = 0
     for (instance, mesh), stands in zip(scene.placed(), prepared.placed, strict=True):
         if stands is not None:

@@ -83,7 +83,7 @@ def build_world(
 
     center : (3,) float64, where coordinates are to be finest; None: amid the vertices
     """
-    uses = np.bincount([p.part for p in placements], minlength=len(parts))
+    uses = np.bincount(np.array([p.part for p in placements], np.int64), minlength=len(parts))
     instanced = [bool(uses[p.part] > 1 and _invertible(p.transform)) for p in placements]
     fixed = [p for p, shared in zip(placements, instanced, strict=True) if not shared]
     moving = [p for p, shared in zip(placements, instanced, strict=True) if shared]
