@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from aobake.errors import InputError
 from aobake.findings import Finding, FindingKind
 from aobake.meshes.normals import unit_rows
-from aobake.meshes.scene import Instance, Scene
+from aobake.meshes.scene import Instance, Mesh, Scene
 from aobake.meshes.surface import Surface, findings, surface_of
 from aobake.plan import plan
 from aobake.points import SurfacePoints
@@ -63,7 +63,7 @@ def bake_vertices(
     seconds: dict[str, float] = {}
     with _timed(seconds, "prepare"):
         decided = plan(scene, settings)
-        surfaces = surfaces_of(scene)
+        surfaces = surfaces_of(scene, settings)
         if settings.strict:
             _refuse(scene, [finding for surface in surfaces for finding in surface.findings])
     with _timed(seconds, "build"):
@@ -121,7 +121,7 @@ def visibility(
     if above is not None:
         usable &= above.any(axis=1)
     chosen = np.flatnonzero(usable)
-    prepared = build(scene, surfaces_of(scene), settings)
+    prepared = build(scene, surfaces_of(scene, settings), settings)
     points = SurfacePoints(
         positions=at[chosen],
         normals=around[chosen],
@@ -143,12 +143,24 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     seconds[stage] = time.perf_counter() - start
 
 
-def surfaces_of(scene: Scene) -> list[Surface]:
-    """Each mesh as the tracer needs it, named as a user would name it."""
-    return [
-        surface_of(mesh, f"mesh {mesh.name!r}" if mesh.name else f"mesh {number}")
-        for number, mesh in enumerate(scene.meshes)
-    ]
+def surfaces_of(scene: Scene, settings: BakeSettings) -> list[Surface]:
+    """Each mesh as the tracer needs it, mended where that was asked for, named as a user would name it.
+
+    Raises EngineError where it was, and pymeshlab is missing.
+    """
+    surfaces = []
+    for number, mesh in enumerate(scene.meshes):
+        name = f"mesh {mesh.name!r}" if mesh.name else f"mesh {number}"
+        surfaces.append(_mended(mesh, name, settings) if settings.repair else surface_of(mesh, name))
+    return surfaces
+
+
+def _mended(mesh: Mesh, name: str, settings: BakeSettings) -> Surface:
+    from aobake.meshes.repair import mended
+
+    found = mended(mesh, settings.max_hole, name)
+    surface = surface_of(found.mesh, name)
+    return replace(surface, findings=(*found.findings, *surface.findings))
 
 
 def _not_placed(scene: Scene) -> list[str]:
@@ -193,45 +205,38 @@ def _hit_filter(scene: Scene, material: int | None, settings: BakeSettings) -> i
 
 def vertex_points(scene: Scene, prepared: Prepared) -> SurfacePoints:
     """The vertices to trace from, instance by instance; numbered as they stand in the whole scene."""
-    parts = [_no_points()]
+    asked = [
+        np.zeros(0, np.int64) if stands is None else np.flatnonzero(_asked(*stands))
+        for stands in prepared.placed
+    ]
+    ends = np.cumsum([len(chosen) for chosen in asked], dtype=np.int64)
+    points = _room_for(int(ends[-1]) if len(ends) else 0)
     uses = np.bincount(
         np.array([i.mesh for i in scene.instances], np.int64), minlength=len(scene.meshes)
     )
     first = 0
-    for (instance, mesh), stands in zip(scene.placed(), prepared.placed, strict=True):
+    for number, (instance, mesh) in enumerate(scene.placed()):
+        stands, chosen = prepared.placed[number], asked[number]
         if stands is not None:
-            asked = np.flatnonzero(_asked(*stands))
             linear, shift = instance.transform[:3, :3], instance.transform[:3, 3]
             stretch = float(np.abs(linear).sum(axis=1).max())
-            if uses[instance.mesh] > 1:
-                stretch *= INSTANCED
-            parts.append(
-                SurfacePoints(
-                    positions=mesh.vertices[asked] @ linear.T + shift,
-                    normals=_turned_normals(stands[1].normals[asked], linear),
-                    geometric=None,
-                    detail=stretch * stands[1].detail[asked],
-                    numbers=asked + first,
-                )
-            )
+            stretch *= INSTANCED if uses[instance.mesh] > 1 else 1.0
+            rows = slice(ends[number] - len(chosen), ends[number])
+            points.positions[rows] = mesh.vertices[chosen] @ linear.T + shift
+            points.normals[rows] = _turned_normals(stands[1].normals[chosen], linear)
+            points.detail[rows] = stretch * stands[1].detail[chosen]
+            points.numbers[rows] = chosen + first
         first += len(mesh.vertices)
-    return SurfacePoints(
-        positions=np.concatenate([part.positions for part in parts]),
-        normals=np.concatenate([part.normals for part in parts]),
-        geometric=None,
-        detail=np.concatenate([part.detail for part in parts]),
-        numbers=np.concatenate([part.numbers for part in parts]),
-    )
+    return points
 
 
-def _no_points() -> SurfacePoints:
-    nothing = np.zeros((0, 3))
+def _room_for(count: int) -> SurfacePoints:
     return SurfacePoints(
-        positions=nothing,
-        normals=nothing,
+        positions=np.empty((count, 3)),
+        normals=np.empty((count, 3)),
         geometric=None,
-        detail=np.zeros(0),
-        numbers=np.zeros(0, np.int64),
+        detail=np.empty(count),
+        numbers=np.empty(count, np.int64),
     )
 
 

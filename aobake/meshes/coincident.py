@@ -2,25 +2,42 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.tracing.compiled import kernel
+from aobake.tracing.compiled import inlined, kernel, read_only
 
 __all__ = ["first_equal_row"]
 
+MINUS_ZERO = np.uint64(1 << 63)
 
-def first_equal_row(*columns: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(N,) int64: for each row the number of the first row that equals it in all columns.
 
-    columns : (N, K) float64 each; 0.0 equals -0.0, a row with NaN equals nothing but its own bits
+def first_equal_row(
+    *columns: NDArray[np.float64] | NDArray[np.uint32],
+) -> NDArray[np.int32]:
+    """(N,) int32: for each row the number of the first row that equals it in all columns.
+
+    columns : one or two (N, K) arrays of float64 or uint32; 0.0 equals -0.0, a NaN the same NaN
     A table of hashes, in one pass: np.unique sorts the rows, which takes 30 times as long.
     """
-    first = np.arange(len(columns[0]))
+    first = np.arange(len(columns[0]), dtype=np.int32)
     if len(first):
-        bits = [(np.ascontiguousarray(column) + 0.0).view(np.uint64) for column in columns]
-        _group(bits[0], bits[-1], first)
+        _group(_as_bits(columns[0]), _as_bits(columns[-1]), first)
     return first
+
+
+def _as_bits(column: NDArray[np.float64] | NDArray[np.uint32]) -> NDArray[Any]:
+    array: NDArray[Any] = np.ascontiguousarray(column)
+    return read_only(array if array.dtype == np.uint32 else array.view(np.uint64))
+
+
+@inlined
+def _bits(value):
+    """The bits of a number; those of 0.0 for -0.0."""
+    wide = np.uint64(value)
+    return np.uint64(0) if wide == MINUS_ZERO else wide
 
 
 @kernel
@@ -28,24 +45,28 @@ def _group(a, b, first):
     size = 4
     while size < 2 * len(first):
         size *= 2
-    table = np.full(size, -1, np.int64)
+    table = np.full(size, -1, np.int32)
     for row in range(len(first)):
         h = np.uint64(0x9E3779B97F4A7C15)
         for values in (a, b):
             for k in range(values.shape[1]):
-                h = (h ^ values[row, k]) * np.uint64(0xFF51AFD7ED558CCD)
+                h = (h ^ _bits(values[row, k])) * np.uint64(0xFF51AFD7ED558CCD)
                 h ^= h >> np.uint64(32)
         slot = np.int64(h & np.uint64(size - 1))
-        while table[slot] >= 0:
-            other = table[slot]
-            same = True
-            for k in range(a.shape[1]):
-                same = same and a[row, k] == a[other, k]
-            for k in range(b.shape[1]):
-                same = same and b[row, k] == b[other, k]
-            if same:
-                break
+        while table[slot] >= 0 and not _equal(a, b, row, table[slot]):
             slot = (slot + 1) & (size - 1)
         if table[slot] < 0:
             table[slot] = row
         first[row] = table[slot]
+
+
+@inlined
+def _equal(a, b, row, other):
+    """Whether two rows are the same in both arrays."""
+    for k in range(a.shape[1]):
+        if _bits(a[row, k]) != _bits(a[other, k]):
+            return False
+    for k in range(b.shape[1]):  # noqa: SIM110 - compiled
+        if _bits(b[row, k]) != _bits(b[other, k]):
+            return False
+    return True

@@ -37,13 +37,13 @@ def unit_rows(vectors: FloatArray) -> FloatArray:
 def computed_normals(
     vertices: FloatArray,
     faces: NDArray[np.uint32],
-    place: NDArray[np.int64],
+    place: NDArray[np.int32],
     crease_degrees: float,
 ) -> FloatArray:
     """(V, 3) unit normals of the faces around each vertex; zeros where there is none.
 
     vertices, faces : (V, 3) float64, (F, 3) uint32
-    place : (V,) int64, the first vertex at the same place
+    place : (V,) int32, the first vertex at the same place
     crease_degrees : faces that only share the place of a vertex join in up to this angle from the
         vertex's own faces; faces that share the vertex always do. 0: only those
     Of two faces with the same corners, wound against each other, the first one counts: they are one
@@ -63,14 +63,14 @@ def computed_normals(
 
 def _one_of_each_wall(faces: NDArray[np.uint32]) -> NDArray[np.bool_]:
     """(F,) False for a face that has the corners of an earlier one and is wound against it."""
-    first = first_equal_row(np.sort(faces, axis=1).astype(np.float64))
+    first = first_equal_row(np.sort(faces, axis=1))
     a, b, c = faces.T
     wound = (a > b) ^ (a > c) ^ (b > c)  # parity of the permutation that sorts the corners
     return np.asarray(wound == wound[first], bool)
 
 
 def _corners_by_place(
-    faces: NDArray[np.uint32], place: NDArray[np.int64]
+    faces: NDArray[np.uint32], place: NDArray[np.int32]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Corners (numbered 3 face + k) grouped by place: those of p are corners[start[p]:start[p + 1]]."""
     at = place[faces.reshape(-1)]

@@ -17,43 +17,50 @@ __all__ = ["consistent_winding"]
 
 
 def consistent_winding(
-    vertices: NDArray[np.float64], faces: NDArray[np.uint32], place: NDArray[np.int64]
+    vertices: NDArray[np.float64], faces: NDArray[np.uint32], place: NDArray[np.int32]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """(F,) whether each face has to be turned over, so that neighbours agree; and whether it belongs to
     a closed part that faces inward all the same, because its winding is consistent.
 
     vertices, faces : (V, 3) float64, (F, 3) uint32
-    place : (V,) int64, the first vertex at the same place: soups count as connected where they meet
+    place : (V,) int32, the first vertex at the same place: soups count as connected where they meet
     Faces are neighbours across edges that exactly two of them share; at any other edge, a fin or a
     Moebius band's seam, nothing can be agreed on and nothing is asked.
     """
     turned, inward = np.zeros(len(faces), bool), np.zeros(len(faces), bool)
     if len(faces):
-        _settle(vertices, faces, *_neighbours(place[faces]), turned, inward)
+        start, other, edge = _edges_by_place(faces, place)
+        _settle(vertices, faces, place, start, other, edge, turned, inward)
     return turned, inward
 
 
-def _neighbours(
-    faces: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Pairs (N, 2) of faces that share an edge, whether they run along it the same way (and so
-    disagree), and (F,) which faces have an edge that is not shared by two."""
-    a = faces.reshape(-1)
-    b = np.roll(faces, -1, axis=1).reshape(-1)
-    key = np.minimum(a, b) << 32 | np.maximum(a, b)
-    order = np.argsort(key)
-    ordered = key[order]
-    starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]]) if len(ordered) else order
-    counts = np.diff(np.r_[starts, len(ordered)])
-    two = starts[counts == 2]
-    left, right = order[two], order[two + 1]
-    shared = np.zeros(len(key), bool)
-    shared[left] = shared[right] = True
-    return (
-        np.stack([left // 3, right // 3], axis=1),
-        np.asarray(a[left] == a[right], bool),
-        np.asarray(~shared.reshape(-1, 3).all(axis=1), bool),
-    )
+@kernel
+def _edges_by_place(faces, place):
+    """Edges grouped by the lower of their two places: (start (V + 1,), the higher place, which edge).
+
+    Edges are numbered 3 face + k, and their lists are ordered by the higher place, so that equal edges
+    lie side by side. Sorting all edges by one key took five times the memory, and longer.
+    """
+    start = np.zeros(len(place) + 1, np.int64)
+    for f in range(len(faces)):
+        for k in range(3):
+            start[min(place[faces[f, k]], place[faces[f, (k + 1) % 3]]) + 1] += 1
+    for v in range(len(place)):
+        start[v + 1] += start[v]
+    other = np.empty(3 * len(faces), np.int32)
+    edge = np.empty(3 * len(faces), np.uint32)
+    filled = start[:-1].astype(np.int64)
+    for f in range(len(faces)):
+        for k in range(3):
+            a, b = place[faces[f, k]], place[faces[f, (k + 1) % 3]]
+            at = filled[min(a, b)]
+            other[at], edge[at] = max(a, b), 3 * f + k
+            filled[min(a, b)] += 1
+    for v in range(len(place)):
+        order = np.argsort(other[start[v] : start[v + 1]])
+        other[start[v] : start[v + 1]] = other[start[v] : start[v + 1]][order]
+        edge[start[v] : start[v + 1]] = edge[start[v] : start[v + 1]][order]
+    return start, other, edge
 
 
 @inlined
@@ -72,24 +79,49 @@ def _find(parent, parity, face):
     return root, against
 
 
+@inlined
+def _join(parent, parity, torn, one, other, opposed):
+    """Put two neighbours into one part; opposed: their windings disagree."""
+    a, against_a = _find(parent, parity, one)
+    b, against_b = _find(parent, parity, other)
+    if a != b:
+        low, high = min(a, b), max(a, b)
+        parent[high] = low
+        parity[high] = against_a ^ against_b ^ np.uint8(opposed)
+        torn[low] |= torn[high]
+        a = low
+    torn[a] |= opposed
+
+
+@inlined
+def _begins_low(faces, place, edge):
+    """Whether an edge runs from its lower place to its higher one."""
+    f, k = edge // 3, edge % 3
+    return place[faces[f, k]] < place[faces[f, (k + 1) % 3]]
+
+
 @kernel
-def _settle(vertices, faces, pairs, opposed, open_faces, turned, inward):
+def _settle(vertices, faces, place, start, other, edge, turned, inward):
     """Fill turned and inward (F,): a union-find over neighbours that keeps each face's parity."""
     count = len(faces)
-    parent, parity = np.arange(count), np.zeros(count, np.uint8)
+    parent, parity = np.arange(count).astype(np.int32), np.zeros(count, np.uint8)
     torn = np.zeros(count, np.bool_)  # at roots: somewhere within, neighbours disagree
-    for p in range(len(pairs)):
-        a, against_a = _find(parent, parity, pairs[p, 0])
-        b, against_b = _find(parent, parity, pairs[p, 1])
-        if a != b:
-            low, high = min(a, b), max(a, b)
-            parent[high] = low
-            parity[high] = against_a ^ against_b ^ np.uint8(opposed[p])
-            torn[low] |= torn[high]
-            a = low
-        torn[a] |= opposed[p]
-    volume, area = np.zeros(count), np.zeros(count)
     is_open = np.zeros(count, np.bool_)
+    for v in range(len(start) - 1):
+        first = start[v]
+        while first < start[v + 1]:
+            last = first
+            while last < start[v + 1] and other[last] == other[first]:
+                last += 1
+            if last - first == 2:
+                one, two = edge[first], edge[first + 1]
+                same_way = _begins_low(faces, place, one) == _begins_low(faces, place, two)
+                _join(parent, parity, torn, np.int64(one // 3), np.int64(two // 3), same_way)
+            else:
+                for e in range(first, last):
+                    is_open[edge[e] // 3] = True
+            first = last
+    volume, area = np.zeros(count), np.zeros(count)
     for f in range(count):
         root, against = _find(parent, parity, f)
         o = row(vertices, faces[root, 0])
@@ -101,7 +133,7 @@ def _settle(vertices, faces, pairs, opposed, open_faces, turned, inward):
         sign = -1.0 if against else 1.0
         volume[root] += sign * dot(a, cross(b, c))
         area[root] += sign * length(cross(minus(b, a), minus(c, a)))
-        is_open[root] |= open_faces[f]
+        is_open[root] |= is_open[f]
     for f in range(count):
         root, against = _find(parent, parity, f)
         if torn[root]:

@@ -16,7 +16,7 @@ from aobake.meshes.coincident import first_equal_row
 from aobake.meshes.normals import CREASE_DEGREES, computed_normals, unit_rows
 from aobake.meshes.orientation import consistent_winding
 from aobake.meshes.scene import Mesh
-from aobake.tracing.compiled import tight_kernel
+from aobake.tracing.compiled import read_only, tight_kernel
 from aobake.tracing.conditioning import detail_at_vertices
 from aobake.tracing.vectors import cross, dot, largest, length, minus, row, scaled
 
@@ -33,7 +33,7 @@ class Surface:
     normals : (V, 3) float64, unit length; zeros where none can be told
     asked : (V,) bool, the vertices to trace from: used by a face, finite, with a normal, and the first
         of those that have the same place and the same normal
-    same_as : (V,) int64, the vertex whose value each one takes
+    same_as : (V,) int32, the vertex whose value each one takes
     detail : (V,) float64, the size of the smallest face at each vertex
     findings : what was passed over, mended or is in doubt
     """
@@ -41,7 +41,7 @@ class Surface:
     faces: NDArray[np.uint32]
     normals: FloatArray
     asked: NDArray[np.bool_]
-    same_as: NDArray[np.int64]
+    same_as: NDArray[np.int32]
     detail: FloatArray
     findings: tuple[Finding, ...]
 
@@ -53,12 +53,12 @@ def surface_of(mesh: Mesh, name: str = "") -> Surface:
     """
     vertices = mesh.vertices
     finite = np.asarray(np.isfinite(vertices).all(axis=1), bool)
-    clean = vertices if finite.all() else np.where(finite[:, None], vertices, 0.0)
-    given = mesh.faces.astype(np.uint32)
+    clean = read_only(vertices if finite.all() else np.where(finite[:, None], vertices, 0.0))
+    given = read_only(mesh.faces.view(np.uint32))
     flat = faces_without_area(clean, given)
     whole = np.ones(len(given), bool) if finite.all() else finite[given].all(axis=1)
     usable = whole & ~flat
-    faces = given if usable.all() else given[usable]
+    faces = read_only(given if usable.all() else given[usable])
     faces, normals, found = _with_normals(mesh, clean, faces)
     defined = normals.any(axis=1)
     used = np.zeros(len(vertices), bool)
@@ -115,16 +115,17 @@ def _with_normals(
 
 def _turned(faces: NDArray[np.uint32], over: NDArray[np.bool_]) -> NDArray[np.uint32]:
     """Faces, with those marked wound the other way round."""
-    return np.where(over[:, None], faces[:, [0, 2, 1]], faces) if over.any() else faces
+    turned = np.where(over[:, None], faces[:, [0, 2, 1]], faces) if over.any() else faces
+    return read_only(turned)
 
 
-def _first_asked(same_as: NDArray[np.int64], asked: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _first_asked(same_as: NDArray[np.int32], asked: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Like same_as, but pointing at the first of equal vertices that is asked, where one is."""
-    rows = np.arange(len(same_as))
-    best = np.full(len(same_as), len(same_as))
+    best = np.full(len(same_as), len(same_as), np.int32)
+    rows = np.arange(len(same_as), dtype=np.int32)
     np.minimum.at(best, same_as[asked], rows[asked])
-    chosen = best[same_as]
-    return np.where(asked & (chosen < len(same_as)), chosen, rows)
+    best = best[same_as]
+    return np.where(asked & (best < len(same_as)), best, rows)
 
 
 def _against(

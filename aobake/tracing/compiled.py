@@ -14,10 +14,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["aligned", "callback", "inlined", "kernel", "tight_kernel"]
+__all__ = ["aligned", "callback", "inlined", "kernel", "read_only", "tight_kernel"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
+ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -58,6 +59,13 @@ def aligned(count: int, dtype: type[np.generic]) -> NDArray[np.generic]:
     memory = np.zeros(count * size + 64, np.uint8)
     first = -memory.ctypes.data % 64
     return memory[first : first + count * size].view(dtype)
+
+
+def read_only(array: NDArray[ScalarT]) -> NDArray[ScalarT]:
+    """A read-only view, for kernels that only read: numba compiles anew for each mix of the two kinds."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def callback(signature: object, function: Callable[..., object]) -> int:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.tracing.compiled import tight_kernel
+from aobake.tracing.compiled import read_only, tight_kernel
 from aobake.tracing.vectors import length, minus, row
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def detail_at_vertices(vertices: FloatArray, faces: FaceArray) -> FloatArray:
     Not the shortest edge: a sliver is not detail, and scans are full of slivers.
     """
     detail = np.full(len(vertices), np.inf)
-    _refine(faces, _longest_edges(vertices, faces), detail)
+    _refine(read_only(faces), _longest_edges(vertices, faces), detail)
     return detail
 
 
@@ -163,7 +163,7 @@ def split_long_edges(
 
     vertices, faces : (V, 3) float64, (F, 3) uint32
     details, sizes : arrays (D, 3) and (D,) float64: points that will be asked for, and the size of the
-        detail at each of them
+        detail at each of them, infinite where there is none
     Returns the vertices with the new ones behind them, and the faces; the same arrays if nothing is
     too large. At most 2 F + SPARE_FACES faces come of it.
     """
@@ -173,7 +173,9 @@ def split_long_edges(
     finest = min(float(size.min()) for size in sizes if len(size))
     if not float(longest.max()) > FINEST * finest:
         return vertices, faces
-    point, size = np.concatenate(details), np.concatenate(sizes)
+    used = [np.isfinite(size) for size in sizes]
+    point = np.concatenate([at[some] for at, some in zip(details, used, strict=True)])
+    size = np.concatenate([size[some] for size, some in zip(sizes, used, strict=True)])
     size = np.maximum(size, RESOLVED * np.abs(point).max(axis=1))
     finest = float(size.min())
     large = longest > FINEST * finest
@@ -207,7 +209,7 @@ def split_long_edges(
 def _longest_edges(vertices: FloatArray, faces: FaceArray) -> FloatArray:
     """(F,) length of the longest edge of each face."""
     longest = np.zeros(len(faces))
-    lengthen(vertices, faces, longest)
+    lengthen(read_only(vertices), read_only(faces), longest)
     return longest
 
 

@@ -132,17 +132,18 @@ def _fixed_bodies(
         detail_at_vertices(at, parts[p.part].faces)
         for at, p in zip(placed, [*fixed, *moving], strict=True)
     ]
-    details = [at[np.isfinite(size)] for at, size in zip(placed, sizes, strict=True)]
-    fine = [size[np.isfinite(size)] for size in sizes]
     bodies = []
     for hit_filter in sorted({parts[p.part].hit_filter for p in fixed}):
         split = [
-            split_long_edges(at, parts[p.part].faces, details, fine)
+            split_long_edges(at, parts[p.part].faces, placed, sizes)
             for at, p in zip(placed, fixed, strict=False)
             if parts[p.part].hit_filter == hit_filter
         ]
         first = np.cumsum([0, *(len(vertices) for vertices, _ in split)])
-        faces = [faces + np.uint32(start) for (_, faces), start in zip(split, first, strict=False)]
+        faces = [
+            faces + np.uint32(start) if start else faces
+            for (_, faces), start in zip(split, first, strict=False)
+        ]
         bodies.append(_Body(_joined([v for v, _ in split]), _joined(faces), hit_filter))
     return bodies
 
