@@ -3,11 +3,13 @@
 # make install set up only: everything goes into ./.venv, nothing outside of it is touched
 # make check   format, lint, strict types, tests
 # make bench   the measurements that the documents quote
+# make fuzz    damaged files to every reader, for FUZZ_SECONDS (60); what breaks is kept in .fuzz/failures
 #
 # PYTHON=python3.12 chooses an interpreter, VENV=folder another place.
 
 PYTHON ?= python3
 VENV ?= .venv
+FUZZ_SECONDS ?= 60
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
@@ -16,7 +18,7 @@ export PIP_REQUIRE_VIRTUALENV := 1
 unexport PIP_USER PYTHONHOME PYTHONPATH
 
 .DELETE_ON_ERROR:
-.PHONY: demo test install check lint bench clean
+.PHONY: demo test install check lint bench fuzz clean
 
 demo: install
 	@$(BIN)/aobake demo -o aobake-demo --force
@@ -37,8 +39,12 @@ lint: install
 bench: install
 	@for benchmark in benchmarks/*.py; do $(BIN)/python "$$benchmark" || exit 1; done
 
+fuzz: install
+	@"$(BIN)/python" -m pip install --quiet --editable ".[fuzz]"
+	@$(BIN)/python -m fuzz.run --seconds $(FUZZ_SECONDS)
+
 clean:
-	rm -rf "$(VENV)" aobake-demo build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf "$(VENV)" .fuzz aobake-demo build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 # The stamp is written last, so that an interrupted set-up is taken up again.
 $(STAMP): pyproject.toml

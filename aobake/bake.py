@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from aobake.errors import InputError
 from aobake.findings import Finding, FindingKind
 from aobake.meshes.normals import unit_rows
-from aobake.meshes.scene import Instance, Mesh, Scene
-from aobake.meshes.surface import Surface, findings, surface_of
+from aobake.meshes.scene import Instance, Scene
+from aobake.meshes.surface import Surface, findings
+from aobake.meshes.surfaces import surfaces_of
 from aobake.plan import plan
 from aobake.points import SurfacePoints
 from aobake.results import BakedVertices, Estimate
@@ -141,26 +142,6 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     start = time.perf_counter()
     yield
     seconds[stage] = time.perf_counter() - start
-
-
-def surfaces_of(scene: Scene, settings: BakeSettings) -> list[Surface]:
-    """Each mesh as the tracer needs it, mended where that was asked for, named as a user would name it.
-
-    Raises EngineError where it was, and pymeshlab is missing.
-    """
-    surfaces = []
-    for number, mesh in enumerate(scene.meshes):
-        name = f"mesh {mesh.name!r}" if mesh.name else f"mesh {number}"
-        surfaces.append(_mended(mesh, name, settings) if settings.repair else surface_of(mesh, name))
-    return surfaces
-
-
-def _mended(mesh: Mesh, name: str, settings: BakeSettings) -> Surface:
-    from aobake.meshes.repair import mended
-
-    found = mended(mesh, settings.max_hole, name)
-    surface = surface_of(found.mesh, name)
-    return replace(surface, findings=(*found.findings, *surface.findings))
 
 
 def _not_placed(scene: Scene) -> list[str]:
@@ -372,8 +353,9 @@ def _name(scene: Scene, number: int) -> str:
     """What a user would call an instance."""
     instance = scene.instances[number]
     mesh = scene.meshes[instance.mesh].name
-    name = instance.name or mesh
-    return f"{name!r}" if name else f"mesh {instance.mesh}"
+    if instance.name and instance.name != mesh:
+        return f"{instance.name!r}"
+    return f"mesh {mesh!r}" if mesh else f"mesh {instance.mesh}"
 
 
 def _refuse(scene: Scene, found: Sequence[Finding]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,21 +20,31 @@ FindingKind = Literal[
     "unresolved",
     "doubtful",
     "enclosed",
+    "joined",
+    "unreferenced",
+    "non-manifold",
+    "closed-hole",
 ]
 EXAMPLES = 5  # elements that are named
+_CHOICE = re.compile(r"\{(.*?)\|(.*?)\}")
 
+# {one|several}: what is said of one, and of any other number
 _SENTENCES: dict[FindingKind, str] = {
-    "non-finite": "vertices are not finite; they and their faces were passed over",
-    "degenerate": "faces have no area and were passed over",
-    "reoriented": "faces were wound against their neighbours and were turned for the bake",
-    "inward": "faces make a closed surface that faces inward: a room, or one turned inside out",
-    "replaced-normal": "normals are zero or not finite and were computed from the faces",
-    "no-normal": "vertices have no normal that could be told and were left open (1)",
-    "contact": "points lie where a surface rests on another one; what is hidden there was left out",
-    "thin": "points face a gap thinner than float32 resolves there; half of it was kept clear",
-    "unresolved": "points lie too far from the others for their detail, even with frames of their own",
-    "doubtful": "points have no side that is in front of all the surfaces around them",
-    "enclosed": "points lie face to face on another surface and came out as closed (0)",
+    "non-finite": "{vertex is|vertices are} not finite; {its|their} faces were passed over",
+    "degenerate": "{face has|faces have} no area and {was|were} passed over",
+    "reoriented": "{face was|faces were} wound against {its|their} neighbours and turned for the bake",
+    "inward": "{face makes|faces make} a closed surface that faces inward: a room, or one turned inside out",
+    "replaced-normal": "{normal is|normals are} zero or not finite and {was|were} computed from the faces",
+    "no-normal": "{vertex has|vertices have} no normal that could be told and {was|were} left open (1)",
+    "contact": "{point lies|points lie} where a surface rests on another one; what is hidden there was left out",
+    "thin": "{point faces|points face} a gap or a tip finer than float32 resolves; the values are in doubt",
+    "unresolved": "{point has|points have} detail around finer than float32 resolves; the values are in doubt",
+    "doubtful": "{point has|points have} no side in front of all that touches there; the values are in doubt",
+    "enclosed": "{point lies|points lie} face to face on another surface and came out as closed (0)",
+    "joined": "{vertex lies|vertices lie} at the place of another one and {was|were} joined with it to mend the mesh",
+    "unreferenced": "{vertex belongs|vertices belong} to no face and {was|were} left open (1)",
+    "non-manifold": "{vertex joins|vertices join} more faces than a surface can and {was|were} split to mend the mesh",
+    "closed-hole": "{hole was|holes were} closed for the bake",
 }
 
 
@@ -55,4 +66,5 @@ class Finding:
     def __str__(self) -> str:
         named = ", ".join(map(str, self.examples))
         more = ", ..." if self.count > len(self.examples) else ""
-        return f"{self.where}: {self.count} {_SENTENCES[self.kind]} ({named}{more})."
+        sentence = _CHOICE.sub(r"\1" if self.count == 1 else r"\2", _SENTENCES[self.kind])
+        return f"{self.where}: {self.count} {sentence} ({named}{more})."

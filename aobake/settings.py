@@ -63,6 +63,13 @@ class BakeSettings:
     strict: bool = False
     """Whether anything that had to be passed over, mended or left in doubt is an error."""
 
+    repair: bool = False
+    """Mends meshes for the bake: joins vertices at one place, splits what is not manifold, closes holes.
+    Needs pymeshlab (aobake[repair]). What is written back is not mended."""
+
+    max_hole: int = 30
+    """Edges around the largest hole that repair closes."""
+
     def __post_init__(self) -> None:
         _whole("rays", self.rays, 1, MOST_RAYS)
         _whole("max_rays", self.max_rays, 1, MOST_RAYS)
@@ -86,8 +93,10 @@ class BakeSettings:
         _choice("method", self.method, get_args(Method))
         if self.ground is not None:
             _choice("ground", self.ground, get_args(GroundAxis))
-        if not isinstance(self.strict, bool):
-            raise SettingsError(f"strict is {self.strict!r}; True or False is needed.")
+        _whole("max_hole", self.max_hole, 3, 1_000_000)
+        for name, value in (("strict", self.strict), ("repair", self.repair)):
+            if not isinstance(value, bool):
+                raise SettingsError(f"{name} is {value!r}; True or False is needed.")
         if self.falloff != "none" and self.max_distance is None:
             raise SettingsError(
                 f"falloff is {self.falloff!r}, but nothing says where it ends: give max_distance as well."
@@ -101,7 +110,8 @@ class StoreSettings:
     store: Store = "color"
     """Where the values go: color (multiplied into the vertex colours), occlusion (glTF: an occlusion
     texture that reads them from a texture coordinate, so that only ambient light is darkened), or
-    attribute (an attribute of its own: _AO in glTF, ao in PLY)."""
+    attribute (an attribute of its own: _AO in glTF, ao in PLY and USD). A format without such a
+    place takes the next one that it has, and a warning says so."""
 
     def __post_init__(self) -> None:
         _choice("store", self.store, get_args(Store))

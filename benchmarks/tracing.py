@@ -61,7 +61,7 @@ class Bare:
 
     def __init__(self, scene: aobake.Scene, rays: int) -> None:
         settings = aobake.BakeSettings(rays=rays)
-        self.prepared = bake.build(scene, bake.surfaces_of(scene), settings)
+        self.prepared = bake.build(scene, bake.surfaces_of(scene, settings), settings)
         points = bake.vertex_points(scene, self.prepared)
         world = self.prepared.world
         self.origins = np.empty(points.positions.shape, np.float32)

@@ -1,6 +1,6 @@
 """The files that fuzzing starts from: one small one for each thing that a reader branches on, and your own.
 
-    python -m fuzz.corpus FOLDER [FILE ...]
+python -m fuzz.corpus FOLDER [FILE ...]
 """
 
 from __future__ import annotations

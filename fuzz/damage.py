@@ -6,12 +6,13 @@ import json
 import random
 import struct
 from collections.abc import Callable
+from typing import Any
 
 __all__ = ["damaged"]
 
 Bytes = Callable[[bytes, random.Random], bytes]
 
-STRANGE = (
+STRANGE: tuple[object, ...] = (
     None, True, -1, 0, 1, 2**31, 2**32 - 1, 2**53, 2**70, 1.5, -0.0, 1e300, 1e-320, "x", "", [], {}, [[]],
     [0], {"a": 1}, "data:,", "http://host/b", "../x", "a\0b", "\ud800", [0, 1, 2], "VEC3", "SCALAR", 5121, 5126,
 )  # fmt: skip
@@ -75,7 +76,7 @@ def _json(text: bytes, rng: random.Random) -> bytes:
     return json.dumps(document).encode("utf-8", "surrogatepass")
 
 
-def _change(holder: dict[object, object] | list[object], key: int, rng: random.Random) -> None:
+def _change(holder: Any, key: Any, rng: random.Random) -> None:
     way, value = rng.random(), holder[key]
     if way < 0.2:
         del holder[key]

@@ -1,9 +1,10 @@
 """One format, fuzzed in this process: by atheris where it is installed, else by seeded damage alone.
 
-    python -m fuzz.one SUFFIX CORPUS FAILURES SECONDS [SEED]
+    python -m fuzz.one SUFFIX CORPUS FAILURES FOLDER SECONDS SEED
 
 What breaks the contract is kept in FAILURES, the smallest file for each place in the source, with its
-traceback beside it; the work goes on.
+traceback beside it; the work goes on. FOLDER holds the input that is being tried, for whoever finds
+this process dead or stuck.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ import importlib
 import importlib.util
 import random
 import sys
-import tempfile
 import time
 import traceback
 from collections.abc import Callable
@@ -34,14 +34,13 @@ COMPILED = (  # numba reads the bytecode of these itself
 Contract = Callable[[Path], bool]
 
 
-def fuzz(suffix: str, corpus: Path, failures: Path, seconds: float, seed: int) -> None:
+def fuzz(
+    suffix: str, corpus: Path, failures: Path, folder: Path, seconds: float, seed: int
+) -> None:
     """Fuzz the reader and the writer of one suffix for a while; atheris ends the process itself."""
     failures.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
-        if importlib.util.find_spec("atheris"):
-            _guided(suffix, corpus, failures, seconds, seed, Path(folder))
-        else:
-            _unguided(suffix, corpus, failures, seconds, seed, Path(folder))
+    way = _guided if importlib.util.find_spec("atheris") else _unguided
+    way(suffix, corpus, failures, seconds, seed, folder)
 
 
 def _guided(
@@ -53,6 +52,9 @@ def _guided(
         for name in ("", ".gltf", ".gltf.read", ".gltf.write", ".obj", ".ply", ".merged"):
             importlib.import_module(f"aobake.meshes.formats{name}")
     hold = importlib.import_module("fuzz.contract").hold
+
+    for path in sorted(corpus.glob(f"*{suffix}"))[:5]:  # compiles the kernels, outside of the clock
+        _try(path.read_bytes(), suffix, hold, folder, failures)
 
     def mutate(data: bytes, most: int, number: int) -> bytes:
         found = damaged(data, suffix, random.Random(number), lambda d, _: atheris.Mutate(d, most))
@@ -125,5 +127,5 @@ def _keep(data: bytes, suffix: str, error: Exception, failures: Path) -> None:
 
 
 if __name__ == "__main__":
-    asked = [*sys.argv[1:], "0"]
-    fuzz(asked[0], Path(asked[1]), Path(asked[2]), float(asked[3]), int(asked[4]))
+    asked = sys.argv[1:]
+    fuzz(asked[0], Path(asked[1]), Path(asked[2]), Path(asked[3]), float(asked[4]), int(asked[5]))

@@ -50,7 +50,7 @@ def test_the_wheel_holds_each_file_once_and_one_package(tmp_path: Path) -> None:
     assert len(names) == len(set(names))
     assert code == packaged()
     assert f"\nVersion: {aobake.__version__}\n" in metadata
-    for extra in ("repair", "denoise", "plot", "cluster", "all", "dev"):
+    for extra in ("repair", "denoise", "plot", "cluster", "formats", "usd", "all", "dev"):
         assert f"\nProvides-Extra: {extra}\n" in metadata
 
 

@@ -24,6 +24,8 @@ from aobake.cli.options import field_help
         ("rays", "256"),
         ("rays", None),
         ("max_rays", 0),
+        ("max_hole", 2),
+        ("repair", 1),
         ("seed", -1),
         ("seed", 2**64),
         ("threads", 0),

@@ -111,8 +111,10 @@ def _shown(value: object) -> str:
         case float():
             return f"{value:.6g}"
         case list() | tuple():
-            more = f", and {len(value) - MOST_SHOWN} more" if len(value) > MOST_SHOWN else ""
-            return ", ".join(map(_shown, value[:MOST_SHOWN])) + more if value else "none"
+            shown = [_shown(part) for part in value[:MOST_SHOWN]]
+            apart = "; " if any(", " in part for part in shown) else ", "
+            more = [f"and {len(value) - MOST_SHOWN} more"] if len(value) > MOST_SHOWN else []
+            return apart.join([*shown, *more]) or "none"
         case dict():
             return ", ".join(f"{name} {_shown(part)}" for name, part in value.items()) or "none"
         case None | "":

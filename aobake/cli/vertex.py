@@ -25,8 +25,8 @@ def vertex(
 ) -> int:
     """Bake ambient occlusion to vertex colours.
 
-    Reads glTF, GLB, OBJ, PLY, STL, OFF, 3MF and DAE; writes glTF, GLB, OBJ
-    and PLY. Everything else in the asset stays as it is.
+    Reads glTF, GLB, OBJ, PLY, USD, STL, OFF, 3MF and DAE; writes glTF, GLB,
+    OBJ, PLY and USD layers. Everything else in the asset stays as it is.
 
     Defaults can be set in a file aobake.toml beside the input or in a folder
     above it: one setting a line, named as below with underscores, such as

@@ -46,8 +46,8 @@ def computed_normals(
     place : (V,) int32, the first vertex at the same place
     crease_degrees : faces that only share the place of a vertex join in up to this angle from the
         vertex's own faces; faces that share the vertex always do. 0: only those
-    Of two faces with the same corners, wound against each other, the first one counts: they are one
-    wall with two sides, and their sum would be zero.
+    Of faces with the same corners only the first one counts: twins would weigh twice, and the two sides
+    of one wall would add up to nothing.
     """
     counts = _one_of_each_wall(faces)
     sums = np.zeros((len(vertices), 3))
@@ -62,11 +62,9 @@ def computed_normals(
 
 
 def _one_of_each_wall(faces: NDArray[np.uint32]) -> NDArray[np.bool_]:
-    """(F,) False for a face that has the corners of an earlier one and is wound against it."""
+    """(F,) False for a face that has the corners of an earlier one: its twin, or the back of its wall."""
     first = first_equal_row(np.sort(faces, axis=1))
-    a, b, c = faces.T
-    wound = (a > b) ^ (a > c) ^ (b > c)  # parity of the permutation that sorts the corners
-    return np.asarray(wound == wound[first], bool)
+    return np.asarray(first == np.arange(len(first)), bool)
 
 
 def _corners_by_place(

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -215,11 +215,18 @@ class Scene:
 
 def _mesh(vertices: ArrayLike, faces: ArrayLike, normals: ArrayLike | None, name: str) -> Mesh:
     return Mesh(
-        vertices=np.asarray(vertices),
-        faces=np.asarray(faces),
-        normals=None if normals is None else np.asarray(normals),
+        vertices=_array(vertices, "vertices"),
+        faces=_array(faces, "faces"),
+        normals=None if normals is None else _array(normals, "normals"),
         name=name,
     )
+
+
+def _array(values: ArrayLike, what: str) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError) as error:  # rows of different lengths
+        raise InputError(f"{what} are no array of numbers ({error}).") from error
 
 
 def _from_trimesh(mesh: trimesh.Trimesh, name: str) -> Mesh:

@@ -24,6 +24,8 @@ __all__ = ["Surface", "findings", "surface_of"]
 
 FloatArray = NDArray[np.float64]
 
+SAME_NORMAL = 2.0**20  # normals that agree to a millionth are one: sums differ in their last bits
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -64,7 +66,7 @@ def surface_of(mesh: Mesh, name: str = "") -> Surface:
     used = np.zeros(len(vertices), bool)
     used[faces.reshape(-1)] = True
     asked = used & defined
-    same_as = _first_asked(first_equal_row(clean, normals), asked)
+    same_as = _first_asked(first_equal_row(clean, np.round(normals * SAME_NORMAL)), asked)
     found |= {
         "non-finite": ~finite,
         "degenerate": whole & flat,

@@ -165,7 +165,7 @@ def split_long_edges(
     details, sizes : arrays (D, 3) and (D,) float64: points that will be asked for, and the size of the
         detail at each of them, infinite where there is none
     Returns the vertices with the new ones behind them, and the faces; the same arrays if nothing is
-    too large. At most 2 F + SPARE_FACES faces come of it.
+    too large. At most 2 F + SPARE_FACES faces come of it, or 66 F + 4,096 where that is less.
     """
     if len(faces) == 0 or not any(map(len, sizes)):
         return vertices, faces
@@ -183,7 +183,7 @@ def split_long_edges(
         return vertices, faces
     levels = _levels_of_detail(point, size, float(longest.max()))
     settled, active = [faces[~large]], faces[large]
-    most = 2 * len(faces) + SPARE_FACES
+    most = 2 * len(faces) + min(SPARE_FACES, 64 * len(faces) + 4096)
     for _ in range(ROUNDS):
         edges, of_face = _unique_edges(active)
         where = _cuts(vertices[edges[:, 0]], vertices[edges[:, 1]], levels)
@@ -228,10 +228,14 @@ def _levels_of_detail(
     """(size, the points whose detail is at most that size), from coarse to fine."""
     from scipy.spatial import cKDTree
 
-    levels = []
-    size = longest / FINEST
+    levels: list[tuple[float, cKDTree]] = []
+    size, count = longest / FINEST, 0
     while (chosen := sizes <= size).any():
-        levels.append((size, cKDTree(details[chosen])))
+        if int(chosen.sum()) == count:  # the same points ask for more: the level above says nothing
+            levels[-1] = (size, levels[-1][1])
+        else:
+            count = int(chosen.sum())
+            levels.append((size, cKDTree(details[chosen])))
         size /= COARSER
     return levels
 

@@ -22,6 +22,7 @@ from aobake.tracing.vectors import cross, dot, length, minus, row
 
 __all__ = [
     "MOST_TOUCHING",
+    "ULP",
     "Touching",
     "new_touching",
     "note_triangle",
@@ -29,15 +30,13 @@ __all__ = [
     "touching",
 ]
 
-CANDIDATES = (
-    1024  # triangles noted for one ball; what a fan of more needles adds changes no decision
-)
-MOST_TOUCHING = 128  # triangles weighed at one point
+CANDIDATES = 4096  # triangles noted for one ball; a point with more is called doubtful
+MOST_TOUCHING = CANDIDATES  # triangles weighed at one point
+ULP = 2.0**-23  # of a float32 in [1, 2); half of it below
 NO_INSTANCE = 0xFFFFFFFF
 QUERY_FLOATS, CONTEXT_WORDS = 16, 48  # RTCPointQuery and RTCPointQueryContext, with room to spare
-CONTEXT_INSTANCE = (
-    32  # its instID, behind two 4x4 matrices; Embree resets it when it leaves an instance
-)
+# its instID, behind two 4x4 matrices; Embree resets it when it leaves an instance
+CONTEXT_INSTANCE = 32
 ARGUMENT_USER, ARGUMENT_PRIMITIVE, ARGUMENT_CONTEXT = (
     1,
     2,
@@ -140,6 +139,7 @@ class Touching(NamedTuple):
     fronts : (K, 3) float64, unit normals
     inward : (K, 3) float64, unit vectors from the point towards their centres, within their planes
     extent : how far their farthest corner is away
+    reach : how far the nearest of their farthest corners is away: all of them go on at least that far
     slack : how far the transform of an instance among them may be off
     """
 
@@ -148,6 +148,7 @@ class Touching(NamedTuple):
     fronts: NDArray[np.float64]
     inward: NDArray[np.float64]
     extent: float
+    reach: float
     slack: float
 
 
@@ -158,6 +159,7 @@ def new_touching() -> Touching:
         np.empty((3 * MOST_TOUCHING, 3)),
         np.empty((MOST_TOUCHING, 3)),
         np.empty((MOST_TOUCHING, 3)),
+        0.0,
         0.0,
         0.0,
     )
@@ -222,24 +224,26 @@ def distance_to_triangle(a, b, c):
 
 @inlined
 def touching(ask, world, point, radius, buffers, near):
-    """The triangles within a radius of the point, as a Touching that uses the memory of `near`.
+    """The triangles within a radius of the point and their own rounding, as a Touching.
 
     ask : (address of rtcPointQuery, address of the callback, address of the tree)
     world : the arrays of world.World
+    near : whose memory is used
     """
     found = buffers[2]
     candidates_near(ask[0], ask[1], ask[2], point, radius, buffers)
-    count, extent, slack = 0, 0.0, 0.0
+    count, extent, least, slack = 0, 0.0, np.inf, 0.0
     for n in range(np.int64(found[0])):
         if count == MOST_TOUCHING:
             break
         load_corners(world, found, n, point, near.corners, 3 * count)
-        a, b, c = (
-            row(near.corners, 3 * count), row(near.corners, 3 * count + 1), row(near.corners, 3 * count + 2),
-        )  # fmt: skip
+        a = row(near.corners, 3 * count)
+        b, c = row(near.corners, 3 * count + 1), row(near.corners, 3 * count + 2)
         alone = found[1 + 3 * n] == NO_INSTANCE
         loose = 0.0 if alone else world[7][np.int64(found[1 + 3 * n]) - world[4]]
-        reach = radius + loose
+        # A large triangle is where it is only to an ulp of its size, once it is rounded.
+        far = max(length(a), length(b), length(c))
+        reach = radius + loose + ULP * far
         if out_of_reach(a, b, c, reach):
             continue
         front = cross(minus(b, a), minus(c, a))
@@ -255,7 +259,7 @@ def touching(ask, world, point, radius, buffers, near):
         for i in range(3):
             near.fronts[count, i] = front[i]
             near.inward[count, i] = scale * inward[i]
-        extent = max(extent, length(a), length(b), length(c))
+        extent, least = max(extent, far), min(least, far)
         slack = max(slack, loose)
         count += 1
-    return Touching(count, near.corners, near.fronts, near.inward, extent, slack)
+    return Touching(count, near.corners, near.fronts, near.inward, extent, least, slack)

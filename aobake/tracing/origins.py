@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from aobake.tracing.compiled import inlined, tight_kernel
-from aobake.tracing.contacts import MOST_TOUCHING, new_touching, query_buffers, touching
+from aobake.tracing.contacts import MOST_TOUCHING, ULP, new_touching, query_buffers, touching
 from aobake.tracing.vectors import cross, dot, length, minus, row
 
 __all__ = [
@@ -39,14 +39,18 @@ __all__ = [
 # what was found about a point; UNRESOLVED is found where frames are chosen
 PLAIN, CONTACT, THIN, DOUBTFUL, ENCLOSED, UNRESOLVED = 0, 1, 2, 3, 4, 5
 
-ULP = 2.0**-23  # of a float32 in [1, 2); half of it below
 SEARCH_ULPS = 32.0  # radius of what counts as touching, in ulps of the point's largest coordinate
 SMALLEST = 1e-20  # coordinates below this are as good as 0
 ORDINARY = 0.3  # a normal at least this much in front of every triangle needs no further thought
 OWN = 0.02  # a triangle is the point's own if its front looks along the normal at least this much
+OWN_AT_TIPS = 1e-9  # where none looks along it by that much: the tip of a needle, or of a deep pit
 LIFT = 0.1  # how steeply a step from the point into its own triangle's front side rises
 COPLANAR = 1e-6  # 1 - |cosine| between planes that count as one
 HIDDEN = 2
+STEEPEST, FARTHEST = 1e-4, 0.05  # least margin to make up for, and how far the origin may go for it
+# A triangle that rises along the normal makes a hollow: right in its corner a ray may slip through, since
+# no float32 test is sure beside a vertex. A few ulps more cost nothing there.
+HOLLOW, OUT_OF_CORNERS = 0.2, 16.0
 WANTED, ROUNDS = 0.25, 48  # margin that the search for a direction stops at, and its patience
 
 
@@ -81,26 +85,57 @@ def above(near, j):
 
 
 @inlined
+def lies_in_plane(near, i, j, margin):
+    """Whether all corners of triangle i are in the plane of triangle j. Near its tip, any needle's are."""
+    front, height = row(near.fronts, j), above(near, j)
+    for k in range(3):  # noqa: SIM110 - compiled
+        if abs(dot(row(near.corners, 3 * i + k), front) + height) > margin:
+            return False
+    return True
+
+
+@inlined
 def lies_against(near, i, step, margin):
     """Whether triangle i lies face to face on another one at the point: a box on its ground.
 
-    A reversed twin of the same three corners does not count: that is one wall with two sides.
+    A reversed twin of the same three corners does not count: that is one wall with two sides, unless
+    its surface goes on beside it.
     """
     inward = row(near.inward, i)
     q = (step * inward[0], step * inward[1], step * inward[2])
     for j in range(near.filled):
         if (
             dot(row(near.fronts, i), row(near.fronts, j)) < COPLANAR - 1.0
-            and abs(above(near, j)) <= margin
+            and (lies_in_plane(near, i, j, margin) or lies_in_plane(near, j, i, margin))
             and covers(near, j, q, margin)
-            and not same_corners(near, i, j, margin)
+            and (not same_corners(near, i, j, margin) or goes_on(near, j, margin))
         ):
             return True
     return False
 
 
 @inlined
-def side_of(near, j, normal, step, margin, sides):
+def goes_on(near, j, margin):
+    """Whether the surface of triangle j goes on beside it without a twin: a ground, and no wall's back."""
+    for k in range(near.filled):
+        if k == j or dot(row(near.fronts, j), row(near.fronts, k)) < 1.0 - COPLANAR:
+            continue
+        if abs(above(near, k)) <= margin and not has_twin(near, k, margin):
+            return True
+    return False
+
+
+@inlined
+def has_twin(near, k, margin):
+    """Whether another touching triangle has the corners of triangle k."""
+    for m in range(near.filled):  # noqa: SIM110 - compiled
+        if m != k and same_corners(near, k, m, margin):
+            return True
+    return False
+
+
+@inlined
+def side_of(near, j, normal, own, step, margin, sides):
     """The side of triangle j that the point's own triangles lead to: 1, -1, or 0 where it is no matter.
 
     A step from the point into each of its own triangles, and a little up, ends in the space that the
@@ -108,12 +143,21 @@ def side_of(near, j, normal, step, margin, sides):
     """
     front, vote = row(near.fronts, j), 0.0
     for i in range(near.filled):
-        if sides[i] == 1 and dot(row(near.fronts, i), normal) > OWN:
+        if sides[i] == 1 and dot(row(near.fronts, i), normal) > own:
             along = dot(row(near.fronts, i), front)
             if abs(along) > 1.0 - COPLANAR and abs(above(near, j)) <= margin:
                 return 0  # the back of a wall: it asks for nothing new
             vote += step * (dot(row(near.inward, i), front) + LIFT * along) + above(near, j)
     return 1 if vote > 0.0 else -1 if vote < 0.0 else 0
+
+
+@inlined
+def least_front(near, normal):
+    """How much a triangle's front must look along the normal to belong to the point; less at sharp tips."""
+    for i in range(near.filled):
+        if dot(row(near.fronts, i), normal) > OWN:
+            return OWN
+    return OWN_AT_TIPS
 
 
 @inlined
@@ -124,22 +168,23 @@ def take_sides(near, normal, step, margin, sides):
     on others are hidden and have no say. Returns PLAIN, CONTACT where some of them are hidden, or
     ENCLOSED where all of its own are.
     """
-    own, hidden = 0, 0
+    own = least_front(near, normal)
+    belong, hidden = 0, 0
     for i in range(near.filled):
         sides[i] = 0
-        if dot(row(near.fronts, i), normal) > OWN:
-            own += 1
+        if dot(row(near.fronts, i), normal) > own:
+            belong += 1
             sides[i] = 1
             if lies_against(near, i, step, margin):
                 hidden += 1
                 sides[i] = HIDDEN
-    enclosed = own > 0 and hidden == own
+    enclosed = belong > 0 and hidden == belong
     for i in range(near.filled):
         if sides[i] == HIDDEN:
             sides[i] = 1 if enclosed else 0
     for j in range(near.filled):
-        if not dot(row(near.fronts, j), normal) > OWN:
-            sides[j] = side_of(near, j, normal, step, margin, sides)
+        if not dot(row(near.fronts, j), normal) > own:
+            sides[j] = side_of(near, j, normal, own, step, margin, sides)
     return ENCLOSED if enclosed else CONTACT if hidden > 0 else PLAIN
 
 
@@ -173,13 +218,16 @@ def direction_in_front(near, normal, sides):
 
 @inlined
 def room_ahead(near, direction, distance, margin):
-    """At most `distance`, and at most half way to any triangle that lies across a gap."""
+    """At most `distance`, and at most half way to any triangle that the way there would cross."""
     for j in range(near.filled):
         height = above(near, j)
         approach = dot(direction, row(near.fronts, j)) * (-1.0 if height > 0.0 else 1.0)
         gap = abs(height)
         if gap > margin and approach > 0.0 and distance * approach > 0.5 * gap:
-            distance = 0.5 * gap / approach
+            way = gap / approach
+            met = (way * direction[0], way * direction[1], way * direction[2])
+            if covers(near, j, met, margin):
+                distance = 0.5 * way
     return distance
 
 
@@ -189,7 +237,9 @@ def scratch() -> tuple[object, ...]:
 
 
 @tight_kernel
-def place_origins(functions, scene, world, positions, normals, scratch, origins, states):
+def place_origins(  # noqa: C901 - one point from lookup to origin
+    functions, scene, world, positions, normals, scratch, origins, states
+):
     """Put the origin of each point's rays, and say what was found around it.
 
     functions : (address of rtcPointQuery, address of the callback of contacts.py)
@@ -210,22 +260,29 @@ def place_origins(functions, scene, world, positions, normals, scratch, origins,
         radius = SEARCH_ULPS * ULP * largest
         near = touching(ask, world, point, radius, buffers, near)
         distance = ULP * (2.0 * largest + 3.0 * near.extent) + near.slack
-        if (
-            4.0 * distance > radius
-        ):  # large triangles: what they cannot tell from the point touches it
+        if 4.0 * distance > radius:
+            # What the rounding of large triangles cannot tell from the point touches it.
             radius = 4.0 * distance
             near = touching(ask, world, point, radius, buffers, near)
+        rounding = 2.0 * ULP * (largest + near.extent) + near.slack
         states[p] = PLAIN
-        direction, least = normal, 1.0
+        direction, wanted, least, rise = normal, distance, 1.0, -1.0
         for j in range(near.filled):
             least = min(least, dot(normal, row(near.fronts, j)))
+            rise = max(rise, dot(normal, row(near.inward, j)))
         if least < ORDINARY:
-            rounding = 2.0 * ULP * largest + near.slack
             states[p] = take_sides(near, normal, radius, rounding, sides)
             direction, least = direction_in_front(near, normal, sides)
-            if least < 0.0:
+            if least < 0.0 or near.filled == MOST_TOUCHING:
                 states[p] = max(states[p], DOUBTFUL)
-            wanted = distance / max(least, 0.1)
+            # Between steep walls, a few ulps from each of them is a long way from the tip.
+            steep = min(distance / max(least, STEEPEST), FARTHEST * near.reach)
+            wanted = max(steep, distance / max(least, 0.1))
+        if rise > HOLLOW:
+            wanted = max(wanted, min(OUT_OF_CORNERS * distance, FARTHEST * near.reach))
+        if least < ORDINARY or wanted > distance:
+            if 2.0 * wanted > radius:
+                near = touching(ask, world, point, 2.0 * wanted, buffers, near)
             room = room_ahead(near, direction, wanted, rounding)
             if room < distance:
                 states[p] = max(states[p], THIN)

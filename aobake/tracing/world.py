@@ -84,7 +84,10 @@ def build_world(
     center : (3,) float64, where coordinates are to be finest; None: amid the vertices
     """
     uses = np.bincount(np.array([p.part for p in placements], np.int64), minlength=len(parts))
-    instanced = [bool(uses[p.part] > 1 and _invertible(p.transform)) for p in placements]
+    instanced = [
+        bool(uses[p.part] > 1) and _can_be_instanced(p.transform, parts[p.part].hit_filter)
+        for p in placements
+    ]
     fixed = [p for p, shared in zip(placements, instanced, strict=True) if not shared]
     moving = [p for p, shared in zip(placements, instanced, strict=True) if shared]
     clouds = [_place(p.transform, _spread(parts[p.part])) for p in placements]
@@ -99,11 +102,16 @@ def build_world(
     return World(_tree(bodies, arrays), frame, arrays)
 
 
-def _invertible(transform: FloatArray) -> bool:
-    """Whether an instance can have this transform; a flattened one is put in place instead."""
+def _can_be_instanced(transform: FloatArray, hit_filter: int) -> bool:
+    """Whether an instance can have this transform; otherwise its triangles are put in place.
+
+    One that flattens has no inverse. One that mirrors shows its filter function a space in which fronts
+    are backs.
+    """
     linear = transform[:, :3]
     size = float(np.abs(linear).max())
-    return size > 0.0 and abs(float(np.linalg.det(linear / size))) > 1e-6
+    volume = float(np.linalg.det(linear / size)) if size > 0.0 else 0.0
+    return abs(volume) > 1e-6 and not (hit_filter and volume < 0.0)
 
 
 def _place(transform: FloatArray, points: FloatArray) -> FloatArray:
@@ -184,7 +192,8 @@ def _pool(
     vertices = np.zeros((first_vertex[-1] + spare, 3), np.float32)
     faces = np.zeros((first_face[-1], 3), np.uint32)
     for number, body in enumerate(bodies):
-        vertices[first_vertex[number] : first_vertex[number + 1]] = body.vertices
+        with np.errstate(over="ignore"):  # vertices that no face uses may lie anywhere
+            vertices[first_vertex[number] : first_vertex[number + 1]] = body.vertices
         faces[first_face[number] : first_face[number + 1]] = body.faces
     rows = matrices.reshape(-1, 4)
     return vertices, faces, first_vertex, first_face, fixed, instances, rows, slacks

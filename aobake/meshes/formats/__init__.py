@@ -63,16 +63,13 @@ FAMILIES = (
     Family("gltf", reads=(".glb", ".gltf"), writes=(".glb", ".gltf")),
     Family("obj", reads=(".obj",), writes=(".obj",)),
     Family("ply", reads=(".ply",), writes=(".ply",)),
+    Family("usd", reads=(".usd", ".usda", ".usdc", ".usdz"), writes=(".usda", ".usd", ".usdc")),
     Family("exchange", reads=(".stl", ".off", ".3mf", ".dae")),
 )
 READABLE = tuple(suffix for family in FAMILIES for suffix in family.reads)
 WRITABLE = tuple(suffix for family in FAMILIES for suffix in family.writes)
 REFUSED = {
     ".fbx": "no maintained reader of FBX exists. Export it as GLB, for example from Blender.",
-    **dict.fromkeys(
-        (".usd", ".usda", ".usdc", ".usdz"),
-        "USD is not read. Export it as GLB, for example from Blender.",
-    ),
     ".blend": "this is Blender's own format. Export it as GLB from Blender.",
 }
 
@@ -120,6 +117,11 @@ def _writer(scene: Scene, target: Path) -> Writer:
     for family in FAMILIES:
         if suffix in family.writes:
             return cast(Writer, _module(family))
+    if suffix == ".usdz":
+        raise OutputError(
+            f"{target}: a package is not written; the result is a layer over the file. "
+            "Write that instead (-o NAME.usda), and pack it with usdzip where a package is needed."
+        )
     was = f" {scene.source.path.name} was read as {scene.source.format}." if scene.source else ""
     if suffix in READABLE or suffix in REFUSED:
         raise OutputError(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from aobake.errors import OutputError
 from aobake.meshes.formats import check_target, load, write_vertex_ao
 from aobake.meshes.scene import Instance, Mesh, Scene
-from aobake.settings import StoreSettings
+from aobake.settings import Store, StoreSettings
 
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -123,13 +123,19 @@ def test_an_obj_file_is_written_as_ply_and_the_other_way_round(tmp_path: Path) -
     ("name", "store"),
     [("a.obj", "attribute"), ("a.obj", "occlusion"), ("a.ply", "occlusion")],
 )
-def test_a_store_without_a_place_is_refused_before_the_bake(
-    tmp_path: Path, name: str, store: str
+def test_a_store_without_a_place_takes_the_next_one_and_says_so(
+    tmp_path: Path, name: str, store: Store
 ) -> None:
-    settings = StoreSettings(store=store)  # type: ignore[arg-type]
-    with pytest.raises(OutputError, match=r"-o NAME\.(glb|ply)") as caught:
-        check_target(two_instances(), tmp_path / name, settings)
-    assert "\n" not in str(caught.value)
+    target, settings = tmp_path / name, StoreSettings(store=store)
+    found = check_target(two_instances(), target, settings)
+    assert len(found) == 1
+    assert name in found[0]
+    assert "\n" not in found[0]
+    write_vertex_ao(two_instances(), AO, target, settings)
+    instead = StoreSettings(store="color" if name == "a.obj" else "attribute")
+    assert check_target(two_instances(), target, instead) == ()
+    write_vertex_ao(two_instances(), AO, tmp_path / f"b{target.suffix}", instead)
+    assert target.read_bytes() == (tmp_path / f"b{target.suffix}").read_bytes()
 
 
 def test_values_of_another_scene_are_refused(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from aobake.errors import OutputError
-from aobake.meshes.formats import load, write_vertex_ao
+from aobake.meshes.formats import check_target, load, write_vertex_ao
 from aobake.settings import Store, StoreSettings
 
 Ao = NDArray[np.float32]
@@ -113,6 +113,8 @@ def test_the_weight_of_a_vertex_makes_room_for_its_color(tmp_path: Path) -> None
 def test_a_vertex_line_without_room_is_refused(tmp_path: Path, text: str, finding: str) -> None:
     (tmp_path / "a.obj").write_text(text)
     scene = load(tmp_path / "a.obj")
+    with pytest.raises(OutputError, match=finding):
+        check_target(scene, tmp_path / "b.obj", StoreSettings())
     with pytest.raises(OutputError, match=finding):
         write_vertex_ao(scene, [np.ones(3, np.float32)], tmp_path / "b.obj", StoreSettings())
     assert not (tmp_path / "b.obj").exists()
@@ -320,7 +322,7 @@ def test_colors_in_part_are_refused_and_an_attribute_is_the_cure(tmp_path: Path)
     (tmp_path / "a.ply").write_bytes(data)
     scene = load(tmp_path / "a.ply")
     with pytest.raises(OutputError, match=r"have red of red, green and blue.*--store attribute"):
-        write_vertex_ao(scene, [HURTING], tmp_path / "b.ply", StoreSettings())
+        check_target(scene, tmp_path / "b.ply", StoreSettings())
     write_vertex_ao(scene, [HURTING], tmp_path / "b.ply", StoreSettings(store="attribute"))
 
 
@@ -332,3 +334,14 @@ def test_values_for_another_number_of_vertices_are_refused(tmp_path: Path, name:
     for wrong in (np.ones(6, np.float32), np.ones(8, np.float32)):
         with pytest.raises(OutputError, match="bake it again"):
             write_vertex_ao(scene, [wrong], tmp_path / f"out{name[1:]}", StoreSettings())
+
+
+def test_colors_that_were_baked_before_are_darkened_again_and_it_is_said(tmp_path: Path) -> None:
+    (tmp_path / "a.ply").write_bytes(ply("<", coordinates()))
+    settings, target = StoreSettings(), tmp_path / "c.ply"
+    assert check_target(load(tmp_path / "a.ply"), target, settings) == ()
+    write_vertex_ao(load(tmp_path / "a.ply"), [HURTING], tmp_path / "b.ply", settings)
+    found = check_target(load(tmp_path / "b.ply"), target, settings)
+    assert len(found) == 1
+    assert "b.ply: the vertices have a property ao" in found[0]
+    assert check_target(load(tmp_path / "b.ply"), target, StoreSettings(store="attribute")) == ()

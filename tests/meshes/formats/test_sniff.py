@@ -39,7 +39,7 @@ OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
         ("chair.glb", b"", "the file is empty"),
         ("chair.xyzzy", b"what", ".xyzzy is no known format"),
         ("chair.fbx", b"; FBX 7.4.0", "Export it as GLB"),
-        ("chair.usdz", b"PK\x03\x04", "Export it as GLB"),
+        ("chair.blend", b"of old", "Export it as GLB"),
     ],
 )
 def test_a_wrong_name_is_one_line_with_the_finding_and_the_cure(

@@ -11,7 +11,11 @@ from aobake.meshes.formats.gltf.container import Bytes, padding
 from aobake.meshes.formats.gltf.document import Document
 from aobake.meshes.formats.gltf.jsontext import JsonObject
 
-__all__ = ["Edit"]
+__all__ = ["NAME", "Edit"]
+
+NAME = (
+    "ambient occlusion"  # of the accessors; by it a later bake knows the colours of an earlier one
+)
 
 COMPONENT_OF = {
     "int8": 5120,
@@ -63,8 +67,13 @@ class Edit:
         self.size += len(data) + filler
         return self.append("bufferViews", view)
 
-    def add_accessor(self, column: NDArray[np.generic], *, normalized: bool = False) -> int:
-        """A new vertex attribute, (V, components); its number. Each element starts at a multiple of 4 bytes."""
+    def add_accessors(
+        self, column: NDArray[np.generic], parts: tuple[slice, ...], *, normalized: bool = False
+    ) -> tuple[int, ...]:
+        """New vertex attributes over one column, (V, components); their numbers.
+
+        parts : the components that each of them reads. Each element starts at a multiple of 4 bytes.
+        """
         count, width = column.shape
         spare = padding(width * column.itemsize) // column.itemsize
         if spare:
@@ -73,10 +82,13 @@ class Edit:
         view = self.add_view(
             data, byteStride=(width + spare) * column.itemsize, target=ARRAY_BUFFER
         )
-        accessor: JsonObject = {
-            "bufferView": view,
-            "componentType": COMPONENT_OF[column.dtype.name],
-        }
-        accessor |= {"normalized": True} if normalized else {}
-        accessor |= {"count": count, "type": TYPE_OF[width]}
-        return self.append("accessors", accessor)
+        numbers = []
+        for part in parts:
+            first, end, _ = part.indices(width)
+            accessor: JsonObject = {"name": NAME, "bufferView": view}
+            accessor |= {"byteOffset": first * column.itemsize} if first else {}
+            accessor["componentType"] = COMPONENT_OF[column.dtype.name]
+            accessor |= {"normalized": True} if normalized else {}
+            accessor |= {"count": count, "type": TYPE_OF[end - first]}
+            numbers.append(self.append("accessors", accessor))
+        return tuple(numbers)

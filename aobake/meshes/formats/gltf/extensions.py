@@ -14,6 +14,7 @@ UNDERSTOOD = frozenset(
         "EXT_meshopt_compression",
         "KHR_meshopt_compression",
         "KHR_mesh_quantization",
+        "KHR_node_visibility",
         "EXT_mesh_gpu_instancing",
         "KHR_texture_transform",
     }
@@ -29,7 +30,6 @@ HARMLESS = frozenset(
         "KHR_lights_punctual",
         "KHR_node_hoverability",
         "KHR_node_selectability",
-        "KHR_node_visibility",
         "KHR_physics_rigid_bodies",
         "KHR_techniques_webgl",
         "KHR_xmp",

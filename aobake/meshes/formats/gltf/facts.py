@@ -49,7 +49,7 @@ def facts(source: GltfSource) -> Mapping[str, object]:
         "cameras": document.size("cameras"),
         "extensions used": _strings(document, "extensionsUsed"),
         "extensions required": _strings(document, "extensionsRequired"),
-        "a bake would touch": _touched(source),
+        "a bake touches": _touched(source),
         "problems": _problems(source),
     }
 
@@ -80,7 +80,11 @@ def _sets(primitive: Element) -> int:
 
 
 def _names(document: Document, name: str) -> list[str]:
-    return [entry.name for entry in document.entries(name)]
+    """The number of each entry, with its name where it has one."""
+    return [
+        f'{number} "{entry.name}"' if entry.name else str(number)
+        for number, entry in enumerate(document.entries(name))
+    ]
 
 
 def _strings(document: Document, key: str) -> list[str]:
@@ -95,9 +99,9 @@ def _touched(source: GltfSource) -> list[str]:
         parts.setdefault(binding.mesh, set()).add(binding.primitive)
         nodes.setdefault(binding.mesh, set()).add(binding.node)
     return [
-        f"{source.document.label('meshes', mesh)}: {len(numbers)} of "
+        f"{source.document.label('meshes', mesh)} ({len(numbers)} of "
         f"{len(source.document.entry('meshes', mesh).list_of('primitives'))} primitives, "
-        f"at {len(nodes[mesh])} {'node' if len(nodes[mesh]) == 1 else 'nodes'}"
+        f"{len(nodes[mesh])} {'node' if len(nodes[mesh]) == 1 else 'nodes'})"
         for mesh, numbers in parts.items()
     ]
 

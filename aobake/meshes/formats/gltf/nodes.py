@@ -15,6 +15,7 @@ from aobake.meshes.formats.gltf.element import Element
 __all__ = ["INSTANCING", "NodeTree", "chosen_scene", "gpu_instances", "node_tree", "shown_nodes"]
 
 INSTANCING = "EXT_mesh_gpu_instancing"
+VISIBILITY = "KHR_node_visibility"
 MOST_INSTANCES = 1_000_000  # about a kilobyte each
 
 
@@ -173,7 +174,10 @@ def chosen_scene(document: Document, scene: str | None) -> int | None:
 
 
 def shown_nodes(document: Document, tree: NodeTree, scene: int | None) -> list[int]:
-    """Nodes of a scene, each once, parents before their children and in the order of the file."""
+    """Nodes of a scene, each once, parents before their children and in the order of the file.
+
+    Those that KHR_node_visibility hides are left out, with everything below them.
+    """
     if scene is None:
         first = list(tree.roots)
     else:
@@ -182,7 +186,12 @@ def shown_nodes(document: Document, tree: NodeTree, scene: int | None) -> list[i
     waiting = first[::-1]
     while waiting:
         number = waiting.pop()
-        if number not in found:
+        if number not in found and not _is_hidden(document.entry("nodes", number)):
             found[number] = None
             waiting += tree.children[number][::-1]
     return list(found)
+
+
+def _is_hidden(node: Element) -> bool:
+    extension = node.extension(VISIBILITY)
+    return extension is not None and "visible" in extension and not extension.flag("visible")

@@ -68,7 +68,8 @@ def patch(edit: Edit, source: GltfSource, scene: Scene, ao: Sequence[Values], st
     pool = ColumnPool()
     columns = _columns(source, scene, _by_node(source, scene, ao), places, store, pool)
     accessors = [
-        edit.add_accessor(column, normalized=_scaled(column, store)) for column in pool.columns
+        edit.add_accessors(column, store.parts, normalized=_scaled(column, store))
+        for column in pool.columns
     ]
     written: dict[Key, Place] = {}
     users = _users(source)
@@ -201,15 +202,18 @@ def _copied_mesh(edit: Edit, mesh: int) -> int:
     return edit.append("meshes", {**before, **renamed})
 
 
-def _write(edit: Edit, mesh: int, placed: dict[int, tuple[Place, int]], store: Store) -> None:
-    """Give primitives of a mesh their accessor."""
+def _write(
+    edit: Edit, mesh: int, placed: dict[int, tuple[Place, tuple[int, ...]]], store: Store
+) -> None:
+    """Give primitives of a mesh their accessors."""
     entry = edit.entries("meshes")[mesh]
     primitives = list(cast(list[JsonObject], entry["primitives"]))
-    for number, (place, accessor) in placed.items():
-        name = store.attribute(place)
-        before = primitives[number]
-        attributes = {**cast(JsonObject, before["attributes"]), name: accessor}
-        primitives[number] = _unpacked({**before, "attributes": attributes}, name)
+    for number, (place, accessors) in placed.items():
+        primitive = primitives[number]
+        for name, accessor in zip(store.names(place), accessors, strict=True):
+            attributes = {**cast(JsonObject, primitive["attributes"]), name: accessor}
+            primitive = _unpacked({**primitive, "attributes": attributes}, name)
+        primitives[number] = primitive
     edit.entries("meshes")[mesh] = {**entry, "primitives": primitives}
 
 

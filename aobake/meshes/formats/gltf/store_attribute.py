@@ -8,13 +8,16 @@ from numpy.typing import NDArray
 from aobake.meshes.formats.gltf.edit import Edit
 from aobake.meshes.formats.gltf.stores import Place
 
-__all__ = ["AttributeStore"]
+__all__ = ["AO", "AttributeStore"]
+
+AO = "_AO"
 
 
 class AttributeStore:
     """_AO, a float for each vertex; one that is there already is replaced."""
 
     normalized = False
+    parts: tuple[slice, ...] = (slice(None),)
 
     def check(self, place: Place) -> None:
         """Every primitive can hold it."""
@@ -23,9 +26,9 @@ class AttributeStore:
         """(V, 1) float32."""
         return ao.reshape(-1, 1)
 
-    def attribute(self, place: Place) -> str:  # noqa: ARG002
+    def names(self, place: Place) -> tuple[str, ...]:  # noqa: ARG002
         """_AO: names of applications begin with an underscore."""
-        return "_AO"
+        return (AO,)
 
     def finish(self, edit: Edit, places: dict[tuple[int, int], Place]) -> None:
         """Nothing else changes."""

@@ -20,6 +20,7 @@ class ColorStore:
     """COLOR_0 times the occlusion, its alpha kept; grey with alpha one where there was none."""
 
     normalized = True
+    parts: tuple[slice, ...] = (slice(None),)
 
     def check(self, place: Place) -> None:
         """Raise OutputError where there are vertex colours that cannot be read."""
@@ -41,9 +42,9 @@ class ColorStore:
         whole[:, :3] *= ao[:, None]
         return np.rint(whole).astype(np.uint16)
 
-    def attribute(self, place: Place) -> str:  # noqa: ARG002
+    def names(self, place: Place) -> tuple[str, ...]:  # noqa: ARG002
         """COLOR_0."""
-        return NAME
+        return (NAME,)
 
     def finish(self, edit: Edit, places: dict[tuple[int, int], Place]) -> None:
         """Nothing else changes."""

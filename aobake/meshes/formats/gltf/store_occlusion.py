@@ -1,7 +1,9 @@
 """Ambient occlusion as an occlusion texture: an extra TEXCOORD set whose u looks it up in a gradient.
 
 Stock viewers then darken ambient light only, which is what occlusionTexture means. Materials that are
-also used without the new set are copied.
+also used without the new set are copied. The gradient does not change with v, so v is free to hold the
+value itself, and _AO reads it there: programs find the same attribute as with the attribute store, and a
+later bake finds the set that it may replace. Floats, since attributes start at multiples of four bytes.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from aobake.meshes.formats.gltf.edit import Edit
 from aobake.meshes.formats.gltf.element import Element
 from aobake.meshes.formats.gltf.gradient import coordinate, gradient_png
 from aobake.meshes.formats.gltf.jsontext import JsonObject
+from aobake.meshes.formats.gltf.store_attribute import AO
 from aobake.meshes.formats.gltf.stores import Place
 
 __all__ = ["OcclusionStore", "free_set"]
@@ -25,40 +28,55 @@ VARIANTS = "KHR_materials_variants"
 CLAMP_TO_EDGE, LINEAR = 33071, 9729
 
 
-def free_set(primitive: Element) -> int:
-    """The lowest n for which a primitive has no TEXCOORD_n: sets are numbered without a gap."""
-    attributes = primitive.needed("attributes")
-    return next(n for n in range(len(attributes.value) + 1) if f"TEXCOORD_{n}" not in attributes)
+def free_set(place: Place) -> int:
+    """The n of the TEXCOORD_n that an earlier bake has left, else the lowest one that is not there.
+
+    Sets are numbered without a gap.
+    """
+    attributes = place.primitive.needed("attributes")
+    ours = _view_of(place, AO)
+    for n in range(len(attributes.value) + 1):
+        name = f"TEXCOORD_{n}"
+        if name not in attributes or (ours is not None and _view_of(place, name) == ours):
+            return n
+    raise OutputError(f"{place.label} has no texture coordinate set left.")
+
+
+def _view_of(place: Place, name: str) -> int | None:
+    """The buffer view that an attribute reads; None without one."""
+    number = place.primitive.needed("attributes").maybe_integer(name)
+    if number is None:
+        return None
+    return place.reader.reader.accessor(number).maybe_integer("bufferView")
 
 
 class OcclusionStore:
     """TEXCOORD_n and a material that looks it up."""
 
-    normalized = True
+    normalized = False
+    parts: tuple[slice, ...] = (slice(None), slice(1, 2))
 
     def check(self, place: Place) -> None:
         """Raise OutputError where the primitive has no texture coordinate set left."""
-        if free_set(place.primitive) >= MOST_SETS:
+        if free_set(place) >= MOST_SETS:
             raise OutputError(
                 f"{place.label} has {MOST_SETS} texture coordinate sets already, and the occlusion needs one "
                 "more. Keep it in the vertex colours instead (--store color)."
             )
 
     def column(self, place: Place, ao: NDArray[np.float32]) -> NDArray[np.generic]:  # noqa: ARG002
-        """(V, 2) uint16: u looks the value up, v is the middle of the picture."""
-        uv = np.full((len(ao), 2), 32768, np.uint16)
-        uv[:, 0] = np.rint(coordinate(ao) * 65535)
-        return uv
+        """(V, 2) float32: u looks the value up, v is the value itself."""
+        return np.stack([coordinate(ao), ao], axis=1).astype(np.float32)
 
-    def attribute(self, place: Place) -> str:
-        """The first TEXCOORD_n that is free."""
-        return f"TEXCOORD_{free_set(place.primitive)}"
+    def names(self, place: Place) -> tuple[str, ...]:
+        """The first TEXCOORD_n that is free, and _AO."""
+        return f"TEXCOORD_{free_set(place)}", AO
 
     def finish(self, edit: Edit, places: dict[tuple[int, int], Place]) -> None:
         """Give every primitive a material whose occlusion texture reads its new set."""
         if not places:
             return
-        sets = {key: free_set(place.primitive) for key, place in places.items()}
+        sets = {key: free_set(place) for key, place in places.items()}
         chosen = _materials(edit, _uses(edit, sets), _texture(edit))
         meshes = edit.entries("meshes")
         for (mesh, number), level in sets.items():
@@ -84,10 +102,9 @@ def _uses(edit: Edit, sets: dict[tuple[int, int], int]) -> dict[int | None, dict
     """Material (None: the default one) -> the new sets that it is used with (None: without), in order."""
     found: dict[int | None, dict[int | None, None]] = {}
     for mesh, entry in enumerate(edit.entries("meshes")):
-        for number, primitive in enumerate(cast(list[JsonObject], entry.get("primitives", []))):
-            for material in _named(
-                Element(primitive, f"{edit.document.path}: mesh {mesh} primitive {number}")
-            ):
+        whole = Element(entry, f"{edit.document.path}: mesh {mesh}")
+        for number, primitive in enumerate(whole.children("primitives", "primitive")):
+            for material in _named(primitive):
                 found.setdefault(material, {})[sets.get((mesh, number))] = None
     return found
 

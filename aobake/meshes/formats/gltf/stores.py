@@ -33,14 +33,17 @@ class Store(Protocol):
     normalized: bool
     """Whether the whole numbers of a column stand for [0, 1]."""
 
+    parts: tuple[slice, ...]
+    """Which components of a column each attribute reads."""
+
     def check(self, place: Place) -> None:
         """Raise OutputError where the primitive cannot hold it."""
 
     def column(self, place: Place, ao: NDArray[np.float32]) -> NDArray[np.generic]:
         """(V, components) as stored, of (V,) values in [0, 1]."""
 
-    def attribute(self, place: Place) -> str:
-        """The name of the attribute that holds the column."""
+    def names(self, place: Place) -> tuple[str, ...]:
+        """The attributes that read the column, one for each of the parts."""
 
     def finish(self, edit: Edit, places: dict[tuple[int, int], Place]) -> None:
         """What is to be changed beyond the attributes; places: (mesh, primitive) of the new JSON -> its place."""

@@ -45,6 +45,7 @@ def read(path: Path, *, root: Path | None, scene: str | None) -> Scene:
         text=text,
         found=_facts(text, geometry, len(faces), normals is not None, warnings),
         rational=bool(geometry.values[4]) and any(geometry.others[word] for word in FREE_FORM),
+        five_numbers=geometry.values[5],
     )
     return Scene.from_meshes([mesh], source=source, warnings=warnings)
 

@@ -17,6 +17,7 @@ class ObjSource:
     text : its bytes
     found : what `facts` gives
     rational : whether free-form surfaces may need the weights of the vertices (v x y z w)
+    five_numbers : vertex lines that have no place for a colour (v x y z and two more)
     """
 
     path: Path
@@ -24,6 +25,7 @@ class ObjSource:
     text: bytes
     found: Mapping[str, object]
     rational: bool = False
+    five_numbers: int = 0
 
     @property
     def format(self) -> str:

@@ -22,22 +22,38 @@ from aobake.settings import StoreSettings
 
 __all__ = ["check", "patched", "write"]
 
+NEITHER = (
+    "which is neither x y z w nor x y z r g b, so there is no place for a color. "
+    "Write PLY or GLB instead (-o NAME.ply)."
+)
+
 
 def check(scene: Scene, store: StoreSettings, target: Path) -> tuple[str, ...]:
-    """Raise OutputError for what OBJ has no place for, and for side files that are in the way."""
-    if store.store != "color":
+    """Raise OutputError for what OBJ has no place for, and for side files that are in the way.
+
+    Vertex colours are the one place that OBJ has: a line says so where another store was asked for.
+    """
+    if isinstance(scene.source, ObjSource):
+        _refuse_without_place(scene.source)
+        copies_beside(scene.source.path, scene.source.files[1:], target)
+    if store.store == "color":
+        return ()
+    return (
+        f'{target}: OBJ has vertex colors alone, so these are darkened, and store "{store.store}" was left aside; '
+        "GLB can hold it",
+    )
+
+
+def _refuse_without_place(source: ObjSource) -> None:
+    if source.rational:
         raise OutputError(
-            f'OBJ can hold vertex colors alone, not store "{store.store}". '
-            "Use --store color, or write GLB or PLY (-o NAME.ply)."
-        )
-    if isinstance(scene.source, ObjSource) and scene.source.rational:
-        raise OutputError(
-            f"{scene.source.path}: its free-form surfaces use weights (v x y z w), which a vertex color "
+            f"{source.path}: its free-form surfaces use weights (v x y z w), which a vertex color "
             "would displace. Write GLB or PLY instead (-o NAME.ply)."
         )
-    if isinstance(scene.source, ObjSource):
-        copies_beside(scene.source.path, scene.source.files[1:], target)
-    return ()
+    if source.five_numbers:
+        raise OutputError(
+            f"{source.path}: {source.five_numbers} vertex lines have five numbers, {NEITHER}"
+        )
 
 
 def write(
@@ -95,10 +111,7 @@ def _spans(block: Block, vertices: IndexArray, where: str) -> tuple[IndexArray, 
     """
     first, words = block.first[vertices], block.words[vertices]
     if (words == 6).any():
-        raise OutputError(
-            f"{where}: a vertex line has five numbers, which is neither x y z w nor x y z r g b, "
-            "so there is no place for a color. Write PLY or GLB instead (-o NAME.ply)."
-        )
+        raise OutputError(f"{where}: a vertex line has five numbers, {NEITHER}")
     colored = words >= 7
     starts = np.where(colored, block.starts[first + np.where(colored, 4, 0)], block.ends[first + 3])
     ends = block.ends[first + np.where(colored, 6, np.where(words == 5, 4, 3))]

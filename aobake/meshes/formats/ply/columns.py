@@ -13,7 +13,7 @@ from aobake.meshes.formats.ply.header import Element, Property
 from aobake.meshes.formats.ply.layout import Layout, scalar_values
 from aobake.settings import StoreSettings
 
-__all__ = ["AO", "COLOR", "Changes", "NewColumn", "byte_colors", "changes"]
+__all__ = ["AO", "COLOR", "Changes", "Held", "NewColumn", "byte_colors", "changes", "held_by"]
 
 COLOR = ("red", "green", "blue")
 AO = "ao"
@@ -40,6 +40,28 @@ class Changes:
     new: tuple[NewColumn, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What the vertices have already. colors : those to be multiplied     ao : the property of that name"""
+
+    colors: tuple[Property, ...]
+    ao: Property | None
+
+
+def held_by(element: Element, store: StoreSettings, where: str) -> Held:
+    """What the vertices hold, as far as a bake with this store is concerned with it.
+
+    Raises OutputError where colours are there in part, or as lists.
+    """
+    ao = element.scalar(AO)
+    if ao is None and any(prop.name == AO for prop in element.properties):
+        raise OutputError(
+            f"{where}: the vertices have a list named {AO}. Rename it, or write GLB instead."
+        )
+    colors = _color_properties(element, where) if store.store == "color" else []
+    return Held(tuple(colors), ao)
+
+
 def byte_colors(ao: NDArray[np.float32]) -> NDArray[np.uint8]:
     """(V,) ambient occlusion as a colour of one byte, to the nearest."""
     rounded: NDArray[np.uint8] = np.rint(np.clip(ao.astype(np.float64), 0.0, 1.0) * 255.0).astype(
@@ -58,27 +80,21 @@ def changes(
     where it is a float or a double, and else replaced by a float.
     Raises OutputError where colours are there in part, or as lists.
     """
-    element = layout.element
+    held = held_by(layout.element, store, where)
     replaced: list[tuple[Property, Numbers]] = []
     removed: list[Property] = []
     new: list[NewColumn] = []
     if store.store == "color":
-        colors = _color_properties(element, where)
         replaced += [
-            (prop, _multiplied(scalar_values(body, layout, prop), prop, ao)) for prop in colors
+            (prop, _multiplied(scalar_values(body, layout, prop), prop, ao)) for prop in held.colors
         ]
-        if not colors:
+        if not held.colors:
             new += [NewColumn(name, "u1", byte_colors(ao)) for name in COLOR]
-    old = element.scalar(AO)
-    if old is not None and old.type[0] == "f":
-        replaced.append((old, ao.astype(old.type)))
+    if held.ao is not None and held.ao.type[0] == "f":
+        replaced.append((held.ao, ao.astype(held.ao.type)))
     else:
-        if old is not None:
-            removed.append(old)
-        elif any(prop.name == AO for prop in element.properties):
-            raise OutputError(
-                f"{where}: the vertices have a list named {AO}. Rename it, or write GLB instead."
-            )
+        if held.ao is not None:
+            removed.append(held.ao)
         new.append(NewColumn(AO, "f4", ao.astype(np.float32)))
     return Changes(tuple(replaced), tuple(removed), tuple(new))
 

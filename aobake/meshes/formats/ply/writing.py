@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from aobake.errors import OutputError
 from aobake.files import write_files
 from aobake.meshes.formats.merged import merged
+from aobake.meshes.formats.ply.columns import held_by
 from aobake.meshes.formats.ply.fresh import document
 from aobake.meshes.formats.ply.patching import patched
 from aobake.meshes.formats.ply.source import PlySource
@@ -20,14 +21,27 @@ from aobake.settings import StoreSettings
 __all__ = ["check", "write"]
 
 
-def check(scene: Scene, store: StoreSettings, target: Path) -> tuple[str, ...]:  # noqa: ARG001 - Writer
-    """Raise OutputError for a store that PLY has no place for."""
+def check(scene: Scene, store: StoreSettings, target: Path) -> tuple[str, ...]:
+    """Raise OutputError for properties that cannot hold it.
+
+    PLY knows no occlusion texture: the property ao takes its place, and a line says so. Another one says
+    where an earlier bake has left its mark.
+    """
+    said = []
     if store.store == "occlusion":
-        raise OutputError(
-            'PLY has no occlusion texture, which store "occlusion" needs. '
-            "Use --store color or --store attribute, or write GLB (-o NAME.glb)."
+        said.append(
+            f"{target}: PLY has no occlusion texture, so the values are kept in the property ao; "
+            "GLB can hold one"
         )
-    return ()
+    if isinstance(scene.source, PlySource):
+        vertex = next(part for part in scene.source.header.elements if part.name == "vertex")
+        held = held_by(vertex, store, str(scene.source.path))
+        if held.colors and held.ao is not None:
+            said.append(
+                f"{scene.source.path}: the vertices have a property ao, so their colors may hold the occlusion "
+                "of an earlier bake, and are darkened a second time; bake the original file"
+            )
+    return tuple(said)
 
 
 def write(
@@ -36,7 +50,7 @@ def write(
     """Write the scene's PLY file with ambient occlusion, or a new one where it was read from no PLY file.
 
     ao : one (V_i,) float32 array per instance
-    store : "color" gives red, green, blue and ao; "attribute" gives ao alone
+    store : "color" gives red, green, blue and ao; any other ao alone
     Returns the target. Raises OutputError; nothing is half-written.
     """
     check(scene, store, target)

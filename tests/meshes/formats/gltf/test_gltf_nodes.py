@@ -213,3 +213,18 @@ def test_a_skin_that_lies_is_refused(
     builder.json["skins"][0] = skin
     with pytest.raises(InputError, match=words):
         load(builder.glb(tmp_path / "a.glb"))
+
+
+def test_a_hidden_node_is_passed_over_with_everything_below_it(tmp_path: Path) -> None:
+    def looks(visible: bool) -> dict[str, Any]:
+        return {"KHR_node_visibility": {"visible": visible}}
+
+    builder = Builder()
+    mesh = builder.mesh()
+    below = builder.node(mesh=mesh, name="below", extensions=looks(True))
+    hidden = builder.node(mesh=mesh, name="hidden", children=[below], extensions=looks(False))
+    shown = builder.node(mesh=mesh, name="shown", extensions=looks(True))
+    by_default = builder.node(mesh=mesh, name="too", extensions={"KHR_node_visibility": {}})
+    builder.json["extensionsRequired"] = builder.json["extensionsUsed"] = ["KHR_node_visibility"]
+    scene = load(builder.show(hidden, shown, by_default).glb(tmp_path / "a.glb"))
+    assert [instance.name for instance in scene.instances] == ["shown", "too"]

@@ -209,10 +209,13 @@ def test_an_occlusion_texture_shows_the_values_through_its_own_set(tmp_path: Pat
     }  # fmt: skip
     view = after["bufferViews"][after["images"][texture["source"]]["bufferView"]]
     image = decoded_png(binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]])
-    found = attribute(tmp_path / "b.glb", "TEXCOORD_1") / 65535
-    # Half a step of 16 bits, stretched by 256 / 255.
-    np.testing.assert_allclose(sampled(image, found[:, 0]), values[0], rtol=0, atol=0.6 / 65535)
-    np.testing.assert_allclose(found[:, 1], 0.5, atol=1e-4)
+    found = attribute(tmp_path / "b.glb", "TEXCOORD_1")
+    np.testing.assert_allclose(sampled(image, found[:, 0]), values[0], rtol=0, atol=1e-5)
+    apart = attribute(tmp_path / "b.glb", "_AO")  # the same bytes, read as an attribute
+    np.testing.assert_array_equal(apart[:, 0], values[0])
+    starts = [after["accessors"][n].get("byteOffset", 0) for n in (-2, -1)]
+    assert [start % 4 for start in starts] == [0, 0]
+    assert len(after["bufferViews"]) == len(unpack_glb(source)[0]["bufferViews"]) + 2
     warnings = gltf.check(load(source), StoreSettings(store="occlusion"), tmp_path / "out.glb")
     assert len(warnings) == 1
     assert 'material 0 "wood" has an occlusion texture, which is replaced' in warnings[0]
@@ -312,7 +315,7 @@ def test_nodes_that_share_a_mesh_get_copies_only_where_their_values_differ(
     assert second["name"].startswith("wheel_")
     a, b = first["primitives"][0], second["primitives"][0]
     different = {key for key in a["attributes"] if a["attributes"][key] != b["attributes"][key]}
-    assert len(different) == 1
+    assert len(different) == (2 if store == "occlusion" else 1)
     assert a["indices"] == b["indices"]
 
 
@@ -457,10 +460,51 @@ def test_facts_say_what_is_in_the_file_and_what_a_bake_touches(tmp_path: Path) -
         "UV sets": 0,
     }
     assert {key: facts[key] for key in expected} == expected
-    assert facts["a bake would touch"] == ['mesh 0 "seat": 1 of 2 primitives, at 2 nodes']
+    assert facts["a bake touches"] == ['mesh 0 "seat" (1 of 2 primitives, 2 nodes)']
     assert facts["problems"] == [
         "'missing.png' is missing",
         'mesh 1 "spare" is not part of the scene, and is left as it is',
         'mesh 0 "seat" primitive 0 has no normals: it is shaded flat, and baked so',
     ]
     assert source.format == "GLB"
+
+
+def test_a_second_bake_with_an_occlusion_texture_replaces_the_first(tmp_path: Path) -> None:
+    source = square_builder().glb(tmp_path / "a.glb")
+    first, second = constant(0.25), constant(0.75)
+    bake(source, tmp_path / "b.glb", "occlusion", first)
+    settings = StoreSettings(store="occlusion")
+    assert gltf.check(load(tmp_path / "b.glb"), settings, tmp_path / "c.glb") == ()
+    bake(tmp_path / "b.glb", tmp_path / "c.glb", "occlusion", second)
+    after = unpack_glb(tmp_path / "c.glb")[0]
+    primitive = after["meshes"][0]["primitives"][0]
+    assert sorted(primitive["attributes"]) == ["POSITION", "TEXCOORD_0", "_AO"]
+    assert len(after["materials"]) == 1
+    np.testing.assert_array_equal(attribute(tmp_path / "c.glb", "_AO"), np.full((4, 1), 0.75))
+
+
+def test_colours_that_were_baked_before_are_darkened_again_and_it_is_said(tmp_path: Path) -> None:
+    bake(square_builder().glb(tmp_path / "a.glb"), tmp_path / "b.glb")
+    found = gltf.check(load(tmp_path / "b.glb"), StoreSettings(), tmp_path / "c.glb")
+    assert len(found) == 1
+    assert "b.glb: the vertex colours of 1 primitives hold the occlusion of an earlier" in found[0]
+    attribute_alone = StoreSettings(store="attribute")
+    assert gltf.check(load(tmp_path / "b.glb"), attribute_alone, tmp_path / "c.glb") == ()
+
+
+def test_an_attribute_that_is_taken_off_again_leaves_the_file_as_it_was(tmp_path: Path) -> None:
+    """What a bake adds stands behind what was there: all bytes of the buffer, and all entries of the lists."""
+    builder = square_builder(translation=[1, 2, 3])
+    builder.json["extras"] = {"b": [1e-7, "\u00e9"]}
+    source = builder.glb(tmp_path / "a.glb", (0x4B4E5542, b"a chunk of its own  "))
+    before, binary, chunks = unpack_glb(source)
+    bake(source, tmp_path / "b.glb", "attribute", constant(1.0))
+    after, grown, others = unpack_glb(tmp_path / "b.glb")
+    del after["meshes"][0]["primitives"][0]["attributes"]["_AO"]
+    for name in ("accessors", "bufferViews"):
+        after[name] = after[name][: len(before[name])]
+    after["buffers"][0]["byteLength"] = before["buffers"][0]["byteLength"]
+    assert json.dumps(after) == json.dumps(before)  # the order of the keys as well
+    assert grown[: len(binary)] == binary
+    assert others == chunks
+    np.testing.assert_array_equal(np.frombuffer(grown[len(binary) :], "<f4"), np.ones(4))
