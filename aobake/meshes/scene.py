@@ -214,10 +214,11 @@ class Scene:
 
 
 def _mesh(vertices: ArrayLike, faces: ArrayLike, normals: ArrayLike | None, name: str) -> Mesh:
+    where = f"mesh {name!r}" if name else "mesh"
     return Mesh(
-        vertices=_array(vertices, "vertices"),
-        faces=_array(faces, "faces"),
-        normals=None if normals is None else _array(normals, "normals"),
+        vertices=_array(vertices, f"{where}: vertices"),
+        faces=_array(faces, f"{where}: faces"),
+        normals=None if normals is None else _array(normals, f"{where}: normals"),
         name=name,
     )
 
