@@ -12,6 +12,7 @@ from aobake.cli import terminal
 from aobake.cli.config import Configured
 from aobake.cli.leaving import leaving_promptly
 from aobake.cli.options import CommonOptions
+from aobake.tracing.compiled import import_without_blas
 
 __all__ = ["Work", "bake_vertices_to"]
 
@@ -34,6 +35,7 @@ def bake_vertices_to(scene: Scene, work: Work) -> report.Report:
     """Bake a scene, write it and the report that was asked for, and say so unless told to be quiet."""
     wanted = work.common.report is not None
     inputs = report.digests(work.inputs if wanted else ())  # now: the output may replace an input
+    import_without_blas()
     with leaving_promptly(), terminal.progress_bar(quiet=work.common.quiet) as progress:
         baked = bake_vertices(scene, work.chosen.bake, progress=progress)
     started = time.perf_counter()

@@ -78,29 +78,31 @@ def _corners_by_place(
 
 
 @inlined
-def _sides(vertices, faces, f, k):
-    """Two sides of a face from its corner k, scaled alike so that products neither over- nor underflow."""
-    a = row(vertices, faces[f, k])
-    u = minus(row(vertices, faces[f, (k + 1) % 3]), a)
-    v = minus(row(vertices, faces[f, (k + 2) % 3]), a)
+def _sides(vertices, faces, f):
+    """Sides 0-1, 0-2 and 1-2 of a face, scaled alike so that products neither over- nor underflow."""
+    a, b, c = row(vertices, faces[f, 0]), row(vertices, faces[f, 1]), row(vertices, faces[f, 2])
+    u, v, w = minus(b, a), minus(c, a), minus(c, b)
     size = max(largest(u), largest(v))
-    return scaled(u, size if size > 0.0 else 1.0), scaled(v, size if size > 0.0 else 1.0)
+    size = size if size > 0.0 else 1.0
+    return scaled(u, size), scaled(v, size), scaled(w, size)
 
 
 @inlined
-def _front(vertices, faces, f):
-    """Unit normal of a face; zeros for one without area."""
-    u, v = _sides(vertices, faces, f, 0)
+def _front_and_angles(vertices, faces, f):
+    """(unit normal, angles at the corners) of a face; zeros for one without area.
+
+    An angle is the atan2 of its sine and cosine, exact to 1e-9 for needles of 1e7. The sine times the
+    sides is twice the area at every corner.
+    """
+    u, v, w = _sides(vertices, faces, f)
     normal = cross(u, v)
-    size = length(normal)
-    return scaled(normal, size if size > 0.0 else 1.0)
-
-
-@inlined
-def _angle(vertices, faces, f, k):
-    """Angle of a face at its corner k: atan2 of sine and cosine, exact to 1e-9 for needles of 1e7."""
-    u, v = _sides(vertices, faces, f, k)
-    return np.arctan2(length(cross(u, v)), dot(u, v))
+    sine = length(normal)
+    angles = (
+        np.arctan2(sine, dot(u, v)),
+        np.arctan2(sine, -dot(u, w)),
+        np.arctan2(sine, dot(v, w)),
+    )
+    return scaled(normal, sine if sine > 0.0 else 1.0), angles
 
 
 @tight_kernel
@@ -108,11 +110,10 @@ def _add_own(vertices, faces, counts, sums):
     """Add to sums (V, 3) the normals of the faces of each vertex, weighted by their angle there."""
     for f in range(len(faces)):
         if counts[f]:
-            front = _front(vertices, faces, f)
+            front, angles = _front_and_angles(vertices, faces, f)
             for k in range(3):
-                weight = _angle(vertices, faces, f, k)
                 for i in range(3):
-                    sums[faces[f, k], i] += weight * front[i]
+                    sums[faces[f, k], i] += angles[k] * front[i]
 
 
 @tight_kernel
@@ -125,8 +126,7 @@ def _add_around(  # noqa: PLR0913, PLR0917 - a kernel takes its arrays one by on
         for at in range(start[p], start[p + 1]):
             f, k = corners[at] // 3, corners[at] % 3
             if counts[f] and faces[f, k] != v:
-                front = _front(vertices, faces, f)
+                front, angles = _front_and_angles(vertices, faces, f)
                 if dot(front, row(own, v)) >= cosine:
-                    weight = _angle(vertices, faces, f, k)
                     for i in range(3):
-                        sums[v, i] += weight * front[i]
+                        sums[v, i] += angles[k] * front[i]

@@ -15,6 +15,8 @@ from aobake.tracing.vectors import cross, dot, length, minus, row
 
 __all__ = ["consistent_winding"]
 
+FEW = 32  # edges of a vertex that are sorted by insertion
+
 
 def consistent_winding(
     vertices: NDArray[np.float64], faces: NDArray[np.uint32], place: NDArray[np.int32]
@@ -57,10 +59,25 @@ def _edges_by_place(faces, place):
             other[at], edge[at] = max(a, b), 3 * f + k
             filled[min(a, b)] += 1
     for v in range(len(place)):
-        order = np.argsort(other[start[v] : start[v + 1]])
-        other[start[v] : start[v + 1]] = other[start[v] : start[v + 1]][order]
-        edge[start[v] : start[v + 1]] = edge[start[v] : start[v + 1]][order]
+        if start[v + 1] - start[v] <= FEW:
+            _sort_few(other, edge, start[v], start[v + 1])
+        else:
+            order = np.argsort(other[start[v] : start[v + 1]])
+            other[start[v] : start[v + 1]] = other[start[v] : start[v + 1]][order]
+            edge[start[v] : start[v + 1]] = edge[start[v] : start[v + 1]][order]
     return start, other, edge
+
+
+@inlined
+def _sort_few(other, edge, first, last):
+    """Sort a short list by insertion, which allocates nothing."""
+    for i in range(first + 1, last):
+        key, carried = other[i], edge[i]
+        j = i - 1
+        while j >= first and other[j] > key:
+            other[j + 1], edge[j + 1] = other[j], edge[j]
+            j -= 1
+        other[j + 1], edge[j + 1] = key, carried
 
 
 @inlined

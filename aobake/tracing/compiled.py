@@ -7,6 +7,8 @@ process instead of failing.
 
 from __future__ import annotations
 
+import importlib
+import sys
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar, cast
 
@@ -14,7 +16,15 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["aligned", "callback", "inlined", "kernel", "read_only", "tight_kernel"]
+__all__ = [
+    "aligned",
+    "callback",
+    "import_without_blas",
+    "inlined",
+    "kernel",
+    "read_only",
+    "tight_kernel",
+]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -59,6 +69,21 @@ def aligned(count: int, dtype: type[np.generic]) -> NDArray[np.generic]:
     memory = np.zeros(count * size + 64, np.uint8)
     first = -memory.ctypes.data % 64
     return memory[first : first + count * size].view(dtype)
+
+
+def import_without_blas() -> None:
+    """Import numba's array functions, which every kernel needs, but not scipy's linear algebra with them.
+
+    They ask for it when they are first imported, for np.dot, which no kernel of ours calls: 0.17 s. For
+    a process of our own only: in one that others share, their kernels may want np.dot.
+    """
+    blas = "scipy.linalg.cython_blas"
+    if blas not in sys.modules:
+        sys.modules[blas] = None  # type: ignore[assignment]  # Python's way to say: not there
+        try:
+            importlib.import_module("numba.np.arraymath")
+        finally:
+            del sys.modules[blas]
 
 
 def read_only(array: NDArray[ScalarT]) -> NDArray[ScalarT]:

@@ -50,7 +50,7 @@ HIDDEN = 2
 STEEPEST, FARTHEST = 1e-4, 0.05  # least margin to make up for, and how far the origin may go for it
 # A triangle that rises along the normal makes a hollow: right in its corner a ray may slip through, since
 # no float32 test is sure beside a vertex. A few ulps more cost nothing there.
-HOLLOW, OUT_OF_CORNERS = 0.2, 16.0
+HOLLOW, OUT_OF_CORNERS = 0.5, 16.0
 WANTED, ROUNDS = 0.25, 48  # margin that the search for a direction stops at, and its patience
 
 
