@@ -165,7 +165,7 @@ def build(scene: Scene, surfaces: Sequence[Surface], settings: BakeSettings) -> 
             placed.append(None)
             continue
         placed.append((instance, surface))
-        mirrored = bool(np.linalg.det(transform[:, :3]) < 0.0)
+        mirrored = _mirrors(transform[:, :3])
         key = (instance.mesh, mirrored)
         if key not in parts:
             parts[key] = len(triangles)
@@ -227,6 +227,12 @@ def _asked(instance: Instance, surface: Surface) -> NDArray[np.bool_]:
     return surface.asked & turned.any(axis=1)
 
 
+def _mirrors(linear: FloatArray) -> bool:
+    """Whether a (3, 3) map turns right hands into left ones, however small it makes them."""
+    size = float(np.abs(linear).max()) or 1.0
+    return bool(np.linalg.det(linear / size) < 0.0)
+
+
 def _turned_normals(normals: FloatArray, linear: FloatArray) -> FloatArray:
     """(N, 3) unit normals after a linear map: by its cofactors, which a flattening one has as well."""
     if np.array_equal(linear, np.eye(3)):
@@ -234,7 +240,7 @@ def _turned_normals(normals: FloatArray, linear: FloatArray) -> FloatArray:
     size = float(np.abs(linear).max()) or 1.0
     a, b, c = (linear / size).T
     cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-    sign = -1.0 if np.linalg.det(linear / size) < 0.0 else 1.0
+    sign = -1.0 if _mirrors(linear) else 1.0
     return unit_rows(sign * normals @ cofactors.T)
 
 
