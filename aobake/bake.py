@@ -24,7 +24,7 @@ from aobake.settings import BakeSettings
 from aobake.tracing.backfaces import pass_through_backfaces
 from aobake.tracing.conditioning import detail_beside, regions
 from aobake.tracing.estimate import Estimates, Request, compile_kernels, estimate
-from aobake.tracing.origins import CONTACT, DOUBTFUL, ENCLOSED, THIN, UNRESOLVED
+from aobake.tracing.origins import CONTACT, DOUBTFUL, ENCLOSED, SLIVERS, THIN, UNRESOLVED
 from aobake.tracing.world import Placement, Triangles, World, build_world
 
 __all__ = ["bake_vertices", "build", "surfaces_of", "vertex_points", "visibility"]
@@ -334,6 +334,7 @@ def _per_instance(
 def _findings(scene: Scene, prepared: Prepared, found: Estimates) -> tuple[Finding, ...]:
     """What was found about the meshes, then about the points of each instance."""
     kinds: dict[FindingKind, int] = {
+        "sliver": SLIVERS,
         "contact": CONTACT,
         "thin": THIN,
         "unresolved": UNRESOLVED,

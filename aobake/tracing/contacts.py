@@ -140,6 +140,7 @@ class Touching(NamedTuple):
     inward : (K, 3) float64, unit vectors from the point towards their centres, within their planes
     extent : how far their farthest corner is away
     reach : how far the nearest of their farthest corners is away: all of them go on at least that far
+    width, aspect : of the narrowest of them, and how many times as long as wide it is
     slack : how far the transform of an instance among them may be off
     """
 
@@ -149,6 +150,8 @@ class Touching(NamedTuple):
     inward: NDArray[np.float64]
     extent: float
     reach: float
+    width: float
+    aspect: float
     slack: float
 
 
@@ -159,6 +162,8 @@ def new_touching() -> Touching:
         np.empty((3 * MOST_TOUCHING, 3)),
         np.empty((MOST_TOUCHING, 3)),
         np.empty((MOST_TOUCHING, 3)),
+        0.0,
+        0.0,
         0.0,
         0.0,
         0.0,
@@ -232,7 +237,8 @@ def touching(ask, world, point, radius, buffers, near):
     """
     found = buffers[2]
     candidates_near(ask[0], ask[1], ask[2], point, radius, buffers)
-    count, extent, least, slack = 0, 0.0, np.inf, 0.0
+    count, extent, least, slack, aspect = 0, 0.0, np.inf, 0.0, 0.0
+    width = np.inf
     for n in range(np.int64(found[0])):
         if count == MOST_TOUCHING:
             break
@@ -250,6 +256,7 @@ def touching(ask, world, point, radius, buffers, near):
         size = length(front)
         if not size > 0.0 or not distance_to_triangle(a, b, c) <= reach:
             continue
+        width, aspect = min(width, size / far), max(aspect, far * far / size)
         front = (front[0] / size, front[1] / size, front[2] / size)
         middle = (a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2])
         rise = dot(middle, front)
@@ -262,4 +269,6 @@ def touching(ask, world, point, radius, buffers, near):
         extent, least = max(extent, far), min(least, far)
         slack = max(slack, loose)
         count += 1
-    return Touching(count, near.corners, near.fronts, near.inward, extent, least, slack)
+    return Touching(
+        count, near.corners, near.fronts, near.inward, extent, least, width, aspect, slack
+    )

@@ -30,6 +30,7 @@ __all__ = [
     "DOUBTFUL",
     "ENCLOSED",
     "PLAIN",
+    "SLIVERS",
     "THIN",
     "UNRESOLVED",
     "place_origins",
@@ -37,7 +38,7 @@ __all__ = [
 ]
 
 # what was found about a point; UNRESOLVED is found where frames are chosen
-PLAIN, CONTACT, THIN, DOUBTFUL, ENCLOSED, UNRESOLVED = 0, 1, 2, 3, 4, 5
+PLAIN, SLIVERS, CONTACT, THIN, DOUBTFUL, ENCLOSED, UNRESOLVED = range(7)
 
 SEARCH_ULPS = 32.0  # radius of what counts as touching, in ulps of the point's largest coordinate
 SMALLEST = 1e-20  # coordinates below this are as good as 0
@@ -51,6 +52,9 @@ STEEPEST, FARTHEST = 1e-4, 0.05  # least margin to make up for, and how far the 
 # A triangle that rises along the normal makes a hollow: right in its corner a ray may slip through, since
 # no float32 test is sure beside a vertex. A few ulps more cost nothing there.
 HOLLOW, OUT_OF_CORNERS = 0.5, 16.0
+# The plane of a sliver errs by its aspect more than that of other triangles; beside convex edges.
+SLIVER, BESIDE_SLIVERS, OF_WIDTH, FLAT, LEVEL = 10.0, 0.2, 0.25, 0.999, 0.05
+HOPELESS = 5e3  # aspect beyond which rays are lost all the same: up to 0.01 of a value
 WANTED, ROUNDS = 0.25, 48  # margin that the search for a direction stops at, and its patience
 
 
@@ -248,7 +252,8 @@ def place_origins(  # noqa: C901 - one point from lookup to origin
     positions, normals : (P, 3) float64, in units of the tree; normals of length 1
     scratch : of scratch()
     origins : (P, 3) float32, filled
-    states : (P,) uint8, filled with PLAIN, CONTACT (the surface rests on another one there), THIN (a gap
+    states : (P,) uint8, filled with PLAIN, SLIVERS (a triangle is too
+        narrow for float32), CONTACT (the surface rests on another one there), THIN (a gap
         is narrower than the rounding errors ask for), DOUBTFUL (no side is in front of all that touch)
         or ENCLOSED (the surface lies against another one on all sides: nothing is seen)
     """
@@ -280,6 +285,11 @@ def place_origins(  # noqa: C901 - one point from lookup to origin
             wanted = max(steep, distance / max(least, 0.1))
         if rise > HOLLOW:
             wanted = max(wanted, min(OUT_OF_CORNERS * distance, FARTHEST * near.reach))
+        if near.aspect > SLIVER and least < FLAT and rise < LEVEL:
+            blunt = min(BESIDE_SLIVERS * near.aspect * distance, OF_WIDTH * near.width)
+            wanted = max(wanted, blunt)
+        if near.aspect > HOPELESS:
+            states[p] = max(states[p], SLIVERS)
         if least < ORDINARY or wanted > distance:
             if 2.0 * wanted > radius:
                 near = touching(ask, world, point, 2.0 * wanted, buffers, near)
