@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -18,20 +18,23 @@ from aobake.meshes.scene import Instance, Scene
 from aobake.meshes.surface import Surface, findings
 from aobake.meshes.surfaces import surfaces_of
 from aobake.plan import plan
-from aobake.points import SurfacePoints
+from aobake.points import SurfacePoints, given_points
 from aobake.results import BakedVertices, Estimate
 from aobake.settings import BakeSettings
 from aobake.tracing.backfaces import pass_through_backfaces
 from aobake.tracing.conditioning import detail_beside, regions
 from aobake.tracing.estimate import Estimates, Request, compile_kernels, estimate
 from aobake.tracing.origins import CONTACT, DOUBTFUL, ENCLOSED, SLIVERS, THIN, UNRESOLVED
-from aobake.tracing.world import Placement, Triangles, World, build_world
+from aobake.tracing.world import Placement, Triangles, Watched, World, build_world
 
 __all__ = ["bake_vertices", "build", "surfaces_of", "vertex_points", "visibility"]
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
+# Points in less than this share of a scene are watched, some of them, for detail of this share of it: large
+# triangles are cut beside them as beside vertices.
+SMALL_PART, MOST_WATCHED, WATCHED_DETAIL = 1e3, 64, 1e-7
 INSTANCED = (
     1.0 / 8.0
 )  # detail that float32 resolves on an instance: its transform errs by 8 half-ulps
@@ -46,6 +49,7 @@ class Prepared:
     placements: Sequence[Placement]
     placed: Sequence[tuple[Instance, Surface] | None]
     world: World
+    watched: Watched | None
 
 
 def bake_vertices(
@@ -113,26 +117,14 @@ def visibility(
     Raises InputError for arrays of other shapes, EngineError where Embree cannot be used.
     """
     settings = settings or BakeSettings()
-    at = _rows("positions", positions)
-    around = _matching("normals", normals, at)
-    above = (
-        None if geometric_normals is None else _matching("geometric_normals", geometric_normals, at)
-    )
-    usable = np.isfinite(at).all(axis=1) & around.any(axis=1)
-    if above is not None:
-        usable &= above.any(axis=1)
-    chosen = np.flatnonzero(usable)
-    prepared = build(scene, surfaces_of(scene, settings), settings)
-    points = SurfacePoints(
-        positions=at[chosen],
-        normals=around[chosen],
-        geometric=None if above is None else above[chosen],
-        detail=_detail_at(at[chosen], scene, prepared),
-        numbers=chosen,
-    )
+    points, count = given_points(positions, normals, geometric_normals)
+    surfaces = surfaces_of(scene, settings)
+    prepared = build(scene, surfaces, settings, _watched(points, scene, surfaces))
+    points = replace(points, detail=_detail_at(points.positions, scene, prepared))
     found = _traced(prepared, points, _lowest(scene, prepared, settings), settings, None)
-    mean, error = np.ones(len(at), np.float32), np.zeros(len(at), np.float32)
-    rays = np.zeros(len(at), np.int32)
+    mean, error = np.ones(count, np.float32), np.zeros(count, np.float32)
+    rays = np.zeros(count, np.int32)
+    chosen = points.numbers
     mean[chosen], error[chosen], rays[chosen] = found.mean, found.standard_error, found.rays
     return Estimate(mean=mean, standard_error=error, rays=rays)
 
@@ -153,7 +145,12 @@ def _not_placed(scene: Scene) -> list[str]:
     ]
 
 
-def build(scene: Scene, surfaces: Sequence[Surface], settings: BakeSettings) -> Prepared:
+def build(
+    scene: Scene,
+    surfaces: Sequence[Surface],
+    settings: BakeSettings,
+    watched: Watched | None = None,
+) -> Prepared:
     """Put every instance into one world. Mirrored instances get faces of their own, wound back."""
     parts: dict[tuple[int, bool], int] = {}
     triangles: list[Triangles] = []
@@ -175,8 +172,8 @@ def build(scene: Scene, surfaces: Sequence[Surface], settings: BakeSettings) -> 
             )
         if len(surface.faces):
             placements.append(Placement(parts[key], transform))
-    world = build_world(triangles, placements)
-    return Prepared(surfaces, triangles, placements, placed, world)
+    world = build_world(triangles, placements, watched=watched)
+    return Prepared(surfaces, triangles, placements, placed, world, watched)
 
 
 def _hit_filter(scene: Scene, material: int | None, settings: BakeSettings) -> int:
@@ -255,8 +252,24 @@ def _request(points: SurfacePoints, ground: float | None) -> Request:
     )
 
 
+def _watched(points: SurfacePoints, scene: Scene, surfaces: Sequence[Surface]) -> Watched | None:
+    """Some of the points, where they are all in one small part of the scene: vertices may be far off."""
+    size = 0.0
+    for instance, mesh in scene.placed():
+        if len(surfaces[instance.mesh].faces) and np.isfinite(instance.transform).all():
+            used = mesh.vertices[np.unique(surfaces[instance.mesh].faces)]
+            stretch = float(np.abs(instance.transform[:3, :3]).sum(axis=1).max())
+            size = max(size, stretch * float(np.ptp(used, axis=0).max()))
+    if len(points) == 0 or size <= SMALL_PART * float(np.ptp(points.positions, axis=0).max()):
+        return None
+    step = -(-len(points) // MOST_WATCHED)
+    return Watched(points.positions[::step], size * WATCHED_DETAIL)
+
+
 def _detail_at(positions: FloatArray, scene: Scene, prepared: Prepared) -> FloatArray:
-    """The detail around points: that of the nearest vertex where float32 might not resolve it, else any."""
+    """The detail around points: as they are watched for, or as the nearest vertex has it, else any."""
+    if prepared.watched is not None:
+        return np.full(len(positions), prepared.watched.detail)
     vertices = vertex_points(scene, prepared)
     found, _ = regions(vertices.positions, vertices.detail, prepared.world.frame)
     if len(found) == 1:
@@ -280,7 +293,7 @@ def _traced(
     for center, chosen in found:
         world = prepared.world
         if center is not None:
-            world = build_world(prepared.parts, prepared.placements, center)
+            world = build_world(prepared.parts, prepared.placements, center, prepared.watched)
         before = done
 
         def report(some: int, _: int, before: int = before) -> None:
@@ -371,24 +384,3 @@ def _refuse(scene: Scene, found: Sequence[Finding]) -> None:
         who = f"{scene.source.path}: " if scene.source else ""
         more = f" And {len(found) - 1} more findings." if len(found) > 1 else ""
         raise InputError(f"{who}{found[0]}{more} Mend the asset, or bake it without strict.")
-
-
-def _rows(name: str, values: ArrayLike) -> FloatArray:
-    try:
-        array = np.ascontiguousarray(values, np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} are no array of numbers ({error}).") from error
-    if array.size == 0:
-        return np.zeros((0, 3))
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"{name} have the shape {array.shape}; (P, 3) is needed.")
-    return array
-
-
-def _matching(name: str, values: ArrayLike, positions: FloatArray) -> FloatArray:
-    vectors = _rows(name, values)
-    if len(vectors) != len(positions):
-        raise InputError(
-            f"there are {len(vectors)} {name} for {len(positions)} positions; one each is needed."
-        )
-    return unit_rows(vectors)

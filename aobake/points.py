@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["SurfacePoints"]
+from aobake.errors import InputError
+from aobake.meshes.normals import unit_rows
+
+__all__ = ["SurfacePoints", "given_points"]
 
 FloatArray = NDArray[np.float64]
 
@@ -41,3 +44,51 @@ class SurfacePoints:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+
+def given_points(
+    positions: ArrayLike, normals: ArrayLike, geometric_normals: ArrayLike | None
+) -> tuple[SurfacePoints, int]:
+    """The usable ones of points that a caller gives, numbered as given; and how many were given.
+
+    positions, normals, geometric_normals : (P, 3) float; a point is usable where they are finite and
+        the normals not zero
+    Raises InputError for arrays of other shapes.
+    """
+    at = _rows("positions", positions)
+    around = _matching("normals", normals, at)
+    usable = np.isfinite(at).all(axis=1) & around.any(axis=1)
+    above = None
+    if geometric_normals is not None:
+        above = _matching("geometric_normals", geometric_normals, at)
+        usable &= above.any(axis=1)
+    chosen = np.flatnonzero(usable)
+    points = SurfacePoints(
+        positions=at[chosen],
+        normals=around[chosen],
+        geometric=None if above is None else above[chosen],
+        detail=np.full(len(chosen), np.inf),
+        numbers=chosen,
+    )
+    return points, len(at)
+
+
+def _rows(name: str, values: ArrayLike) -> FloatArray:
+    try:
+        array = np.ascontiguousarray(values, np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} are no array of numbers ({error}).") from error
+    if array.size == 0:
+        return np.zeros((0, 3))
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f"{name} have the shape {array.shape}; (P, 3) is needed.")
+    return array
+
+
+def _matching(name: str, values: ArrayLike, positions: FloatArray) -> FloatArray:
+    vectors = _rows(name, values)
+    if len(vectors) != len(positions):
+        raise InputError(
+            f"there are {len(vectors)} {name} for {len(positions)} positions; one each is needed."
+        )
+    return unit_rows(vectors)

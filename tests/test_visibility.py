@@ -171,9 +171,6 @@ def test_below_a_coarse_face_nothing_counts() -> None:
 # -- points on triangles that are large against their distance ------------------------------------
 
 
-UNSPLIT = "faces are split near vertices only, not near the points that are asked for"
-
-
 @pytest.mark.parametrize(
     "half",
     [1e1, 1e3, 1e5],
@@ -196,8 +193,8 @@ def test_a_point_inside_a_large_face_does_not_hide_behind_it(half: float) -> Non
     [
         1e2,
         1e3,
-        pytest.param(1e5, marks=pytest.mark.xfail(strict=True, reason=UNSPLIT)),
-        pytest.param(1e6, marks=pytest.mark.xfail(strict=True, reason=UNSPLIT)),
+        1e5,
+        1e6,
     ],
 )
 def test_the_walls_of_a_trench_may_be_far_longer_than_it_is_wide(half: float) -> None:

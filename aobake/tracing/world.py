@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from aobake.tracing import embree
 from aobake.tracing.conditioning import UnitFrame, detail_at_vertices, split_long_edges, unit_frame
 
-__all__ = ["Placement", "Triangles", "World", "build_world"]
+__all__ = ["Placement", "Triangles", "Watched", "World", "build_world"]
 
 FloatArray = NDArray[np.float64]
 ScalarT = TypeVar("ScalarT", bound=np.generic)
@@ -52,6 +52,14 @@ class Placement:
 
 
 @dataclass(frozen=True, eq=False)
+class Watched:
+    """A few (P, 3) float64 points that will be asked for, and how fine what is around them may be."""
+
+    positions: FloatArray
+    detail: float
+
+
+@dataclass(frozen=True, eq=False)
 class World:
     """A built scene.
 
@@ -77,11 +85,15 @@ class _Body:
 
 
 def build_world(
-    parts: Sequence[Triangles], placements: Sequence[Placement], center: FloatArray | None = None
+    parts: Sequence[Triangles],
+    placements: Sequence[Placement],
+    center: FloatArray | None = None,
+    watched: Watched | None = None,
 ) -> World:
     """Condition and build what stands in a scene. Raises EngineError.
 
     center : (3,) float64, where coordinates are to be finest; None: amid the vertices
+    watched : points besides the vertices that large triangles must not blur; or None
     """
     uses = np.bincount(np.array([p.part for p in placements], np.int64), minlength=len(parts))
     instanced = [
@@ -92,7 +104,7 @@ def build_world(
     moving = [p for p, shared in zip(placements, instanced, strict=True) if shared]
     clouds = [_place(p.transform, _spread(parts[p.part])) for p in placements]
     frame = unit_frame(clouds, center)
-    bodies = _fixed_bodies(parts, fixed, moving, frame)
+    bodies = _fixed_bodies(parts, fixed, moving, frame, watched)
     kept = sorted({p.part for p in moving})
     frames = {number: unit_frame([_spread(parts[number])]) for number in kept}
     for number in kept:
@@ -133,6 +145,7 @@ def _fixed_bodies(
     fixed: Sequence[Placement],
     moving: Sequence[Placement],
     frame: UnitFrame,
+    watched: Watched | None,
 ) -> list[_Body]:
     """One body per filter, of all that stands where it is, with large triangles split."""
     placed = [frame.apply(_place(p.transform, parts[p.part].vertices)) for p in [*fixed, *moving]]
@@ -140,10 +153,14 @@ def _fixed_bodies(
         detail_at_vertices(at, parts[p.part].faces)
         for at, p in zip(placed, [*fixed, *moving], strict=True)
     ]
+    details = list(placed)
+    if watched is not None:
+        details.append(frame.apply(watched.positions))
+        sizes.append(np.full(len(watched.positions), watched.detail * frame.scale))
     bodies = []
     for hit_filter in sorted({parts[p.part].hit_filter for p in fixed}):
         split = [
-            split_long_edges(at, parts[p.part].faces, placed, sizes)
+            split_long_edges(at, parts[p.part].faces, details, sizes)
             for at, p in zip(placed, fixed, strict=False)
             if parts[p.part].hit_filter == hit_filter
         ]
