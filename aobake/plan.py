@@ -5,6 +5,7 @@ This file imports neither numpy nor the tracer, so that `import aobake` stays li
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -63,15 +64,8 @@ def _occlusion(scene: Scene) -> Effect:
 
 
 def _instances(scene: Scene) -> Effect:
-    placed = [instance.mesh for instance in scene.instances]
-    shared = (
-        sorted({mesh for mesh in placed if placed.count(mesh) > 1}) if len(placed) < 64 else None
-    )
-    if shared is None:
-        counts: dict[int, int] = {}
-        for mesh in placed:
-            counts[mesh] = counts.get(mesh, 0) + 1
-        shared = [mesh for mesh, count in counts.items() if count > 1]
+    counts = Counter(instance.mesh for instance in scene.instances)
+    shared = sorted(mesh for mesh, count in counts.items() if count > 1)
     if not shared:
         return Effect(False, "Every mesh stands in one place.")
     name = scene.meshes[shared[0]].name or f"number {shared[0]}"
