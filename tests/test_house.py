@@ -20,14 +20,15 @@ PACKAGE = ROOT / "aobake"
 
 # From the ground up: a module imports from its own layer and from those before it.
 LAYERS = (
-    ("errors", "findings", "settings", "files"),
+    ("errors", "findings", "overrides", "settings", "render_settings", "files", "images", "stages"),
     ("tracing",),
     ("meshes",),
+    ("occluders", "prepare", "points", "sharing", "open_sky", "occlusion", "leastsquares"),
     ("atlas",),
     ("shading",),
     (
-        "plan", "points", "bake", "results", "environment", "study", "report", "images", "demo",
-        "__init__",
+        "plan", "planning", "bake", "texels", "lightmaps", "previews", "results", "environment", "study",
+        "report", "demo", "viewer", "__init__",
     ),
     ("batch",),
     ("cli", "__main__"),
@@ -39,6 +40,7 @@ SEVERAL = {
     "numpy": "*.py",
     "numba": "tracing/*.py *kernels.py",
     "llvmlite": "tracing/*.py",
+    "scipy": "tracing/*.py leastsquares/system.py",
 }
 STANDARD = sys.stdlib_module_names | {"aobake", "__future__"}
 

@@ -11,6 +11,12 @@ import pytest
 
 from aobake import BakeSettings, SettingsError, StoreSettings
 from aobake.cli.options import field_help
+from aobake.settings import (
+    AtlasSettings,
+    ImageSettings,
+    TraceSettings,
+    VertexSettings,
+)
 
 
 @pytest.mark.parametrize(
@@ -35,6 +41,12 @@ from aobake.cli.options import field_help
         ("tolerance", 0.6),
         ("tolerance", math.nan),
         ("tolerance", "0.01"),
+        ("tolerance", "rms:"),
+        ("tolerance", "rms:0"),
+        ("tolerance", "rms:0.6"),
+        ("tolerance", "each:0.01"),
+        ("tolerance_of", "all"),
+        ("quality", "best"),
         ("max_distance", 0.0),
         ("max_distance", -1.0),
         ("max_distance", math.inf),
@@ -75,6 +87,27 @@ def test_a_value_at_the_edge_of_its_meaning_is_taken(field: str, value: object) 
     assert getattr(BakeSettings(**right), field) == value
 
 
+def test_a_tolerance_for_all_points_is_said_in_one_word() -> None:
+    together: dict[str, Any] = {"tolerance": "rms:0.01"}
+    settings = BakeSettings(**together)
+    assert (settings.tolerance, settings.tolerance_of) == (0.01, "rms")
+    assert BakeSettings(tolerance=0.01).tolerance_of == "each"
+    assert settings == BakeSettings(tolerance=0.01, tolerance_of="rms")
+
+
+def test_a_quality_is_a_tolerance_by_name_and_a_tolerance_has_the_last_word() -> None:
+    assert BakeSettings(quality="draft").tolerance == 0.02
+    assert BakeSettings(quality="normal").tolerance == 0.005
+    assert BakeSettings(quality="final").tolerance == 0.002
+    assert BakeSettings(quality="final", tolerance=0.1).tolerance == 0.1
+
+
+def test_a_tolerance_needs_room_for_its_first_round() -> None:
+    assert BakeSettings(max_rays=1).max_rays == 1
+    with pytest.raises(SettingsError, match="max_rays is 31"):
+        BakeSettings(tolerance=0.01, max_rays=31)
+
+
 def test_a_falloff_needs_a_distance_to_fall_off_over() -> None:
     with pytest.raises(SettingsError, match="max_distance"):
         BakeSettings(falloff="linear")
@@ -92,6 +125,8 @@ def test_settings_cannot_be_changed_after_they_were_checked() -> None:
         BakeSettings().rays = 0  # type: ignore[misc]
 
 
-@pytest.mark.parametrize("kind", [BakeSettings, StoreSettings])
+@pytest.mark.parametrize(
+    "kind", [TraceSettings, VertexSettings, AtlasSettings, StoreSettings, ImageSettings]
+)
 def test_every_setting_explains_itself(kind: type) -> None:
     assert set(field_help(kind)) == {field.name for field in dataclasses.fields(kind)}
