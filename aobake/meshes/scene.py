@@ -8,22 +8,47 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar, cast
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from aobake.errors import InputError
+from aobake.meshes.arrays import (
+    FloatArray,
+    IntArray,
+    array_of,
+    frozen,
+    placement,
+    rows_of_three,
+    triangles_among,
+)
+from aobake.meshes.materials import AlphaMode, Image, Material, Texture, Wrap
+from aobake.meshes.motion import Motion
 
 if TYPE_CHECKING:
     import trimesh
 
-__all__ = ["AlphaMode", "FloatArray", "Instance", "IntArray", "Material", "Mesh", "Scene", "Source"]
+__all__ = [
+    "AlphaMode",
+    "Attribute",
+    "Camera",
+    "FloatArray",
+    "Image",
+    "Instance",
+    "IntArray",
+    "Light",
+    "LightKind",
+    "Material",
+    "Mesh",
+    "Motion",
+    "Scene",
+    "Source",
+    "Texture",
+    "Wrap",
+]
 
-FloatArray: TypeAlias = NDArray[np.float64]
-IntArray: TypeAlias = NDArray[np.int32]
-ScalarT = TypeVar("ScalarT", bound=np.generic)
-AlphaMode = Literal["OPAQUE", "MASK", "BLEND"]
+LightKind = Literal["directional", "point", "spot"]
 
 MOST_VERTICES = 2**31 - 1  # Embree's and our indices are 32 bits wide
 
@@ -48,16 +73,63 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Material:
-    """What a mesh is made of, as far as occlusion and a preview need it."""
+class Camera:
+    """A camera of an asset; it looks along -z of its space, +y is up.
+
+    transform : (4, 4) float64, from its space to the scene's
+    yfov_rad : the full vertical angle of a perspective one; None: an orthographic one
+    height : of the picture of an orthographic one, in scene units
+    """
 
     name: str = ""
-    base_color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)  # linear
-    metallic: float = 0.0
-    roughness: float = 1.0
-    double_sided: bool = False
-    alpha_mode: AlphaMode = "OPAQUE"
-    alpha_cutoff: float = 0.5
+    transform: FloatArray
+    yfov_rad: float | None
+    height: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "transform", placement(self.transform, "camera", self.name))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Light:
+    """A light of an asset; a directional one and a spot shine along -z of its space.
+
+    color : linear; intensity : candela (point, spot) or lux (directional), as glTF has them
+    range : distance beyond which it is not seen, in scene units; None: there is none
+    cone_rad : half angles at which the light of a spot begins to fade and is gone
+    """
+
+    kind: LightKind
+    transform: FloatArray
+    name: str = ""
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    intensity: float = 1.0
+    range: float | None = None
+    cone_rad: tuple[float, float] = (0.0, np.pi / 4)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "transform", placement(self.transform, "light", self.name))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Attribute:
+    """Values on a surface, interpolated between the corners of its triangles.
+
+    values : (N, k) float64
+    corners : (F, 3) int32, the row of each corner of each face; None: that of its vertex
+    """
+
+    values: FloatArray
+    corners: IntArray | None = None
+
+    def __post_init__(self) -> None:
+        values = np.asarray(self.values, np.float64)
+        if values.ndim != 2:
+            raise InputError(f"values of an attribute are (N, k), not {values.shape}.")
+        object.__setattr__(self, "values", frozen(values))
+        if self.corners is not None:
+            corners = triangles_among(self.corners, len(values), "attribute")
+            object.__setattr__(self, "corners", frozen(corners))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -70,6 +142,10 @@ class Mesh:
     flat_shaded : whether a mesh without normals is meant to show facets (glTF), so that coincident
         vertices of different faces keep normals of their own; else they are smoothed up to an angle
     material : index into the scene's materials, or None
+    attributes : what else is on the surface, under the names and with the meaning that glTF gives them:
+        TEXCOORD_n (u, v; v runs down from an image's top edge), COLOR_n (3 or 4, linear), TANGENT (x, y, z,
+        and the bitangent's sign), _AO (1), _BENT_NORMAL (3, turned like normals). May read a value when it
+        is asked for, and then raise InputError
     """
 
     vertices: FloatArray
@@ -78,24 +154,42 @@ class Mesh:
     name: str = ""
     flat_shaded: bool = False
     material: int | None = None
+    attributes: Mapping[str, Attribute] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         where = f"mesh {self.name!r}" if self.name else "mesh"
-        vertices = _rows(self.vertices, np.float64, f"{where}: vertices")
+        vertices = rows_of_three(self.vertices, np.float64, f"{where}: vertices")
         if len(vertices) > MOST_VERTICES:
             raise InputError(
                 f"{where} has {len(vertices)} vertices; at most {MOST_VERTICES} can be baked."
             )
-        faces = _faces(self.faces, len(vertices), where)
-        object.__setattr__(self, "vertices", _frozen(vertices))
-        object.__setattr__(self, "faces", _frozen(faces))
+        faces = triangles_among(self.faces, len(vertices), where)
+        object.__setattr__(self, "vertices", frozen(vertices))
+        object.__setattr__(self, "faces", frozen(faces))
         if self.normals is not None:
-            normals = _rows(self.normals, np.float64, f"{where}: normals")
+            normals = rows_of_three(self.normals, np.float64, f"{where}: normals")
             if len(normals) != len(vertices):
                 raise InputError(
                     f"{where} has {len(normals)} normals for {len(vertices)} vertices; one each is needed."
                 )
-            object.__setattr__(self, "normals", _frozen(normals))
+            object.__setattr__(self, "normals", frozen(normals))
+
+    def at_corners(self, name: str) -> FloatArray | None:
+        """(F, 3, k) float64 values of an attribute at the corners of each face; None where there is none.
+
+        Raises InputError where they cannot be read, or do not belong to this mesh.
+        """
+        if name not in self.attributes:
+            return None
+        found = self.attributes[name]
+        given, needed = (
+            (len(found.values), len(self.vertices))
+            if found.corners is None
+            else (len(found.corners), len(self.faces))
+        )
+        if given != needed:
+            raise InputError(f"mesh {self.name!r}: {name} is for {given} elements, not {needed}.")
+        return found.values[self.faces if found.corners is None else found.corners]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -104,19 +198,17 @@ class Instance:
 
     mesh : index into the scene's meshes
     transform : (4, 4) float64, from the mesh's space to the scene's, for column vectors
+    stored_with : the instance, this one or an earlier one, with which it shares its place in the file, so
+        that both can only be given the same values (EXT_mesh_gpu_instancing); None: it has its own
     """
 
     mesh: int
     transform: FloatArray = field(default_factory=lambda: np.eye(4))
     name: str = ""
+    stored_with: int | None = None
 
     def __post_init__(self) -> None:
-        transform = np.array(self.transform, np.float64)
-        if transform.shape != (4, 4):
-            raise InputError(
-                f"instance {self.name!r}: a transform is (4, 4), not {transform.shape}."
-            )
-        object.__setattr__(self, "transform", _frozen(transform))
+        object.__setattr__(self, "transform", placement(self.transform, "instance", self.name))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -124,6 +216,9 @@ class Scene:
     """Everything that occludes, and everything that is baked.
 
     meshes, instances, materials : see there; values are baked per instance, in the order of instances
+    images : what textures refer to
+    cameras, lights : those of the file, where they stand; a bake needs neither
+    motion : what of it can move, and how it stands
     source : the document that the scene was read from; None for a scene made from arrays
     warnings : what the reader passed over or had to mend, one line each
     """
@@ -131,6 +226,10 @@ class Scene:
     meshes: tuple[Mesh, ...]
     instances: tuple[Instance, ...]
     materials: tuple[Material, ...] = ()
+    images: tuple[Image, ...] = ()
+    cameras: tuple[Camera, ...] = ()
+    lights: tuple[Light, ...] = ()
+    motion: Motion = field(default_factory=Motion)
     source: Source | None = None
     warnings: tuple[str, ...] = ()
 
@@ -176,26 +275,13 @@ class Scene:
     def from_trimesh(cls, mesh: trimesh.Trimesh | trimesh.Scene) -> Scene:
         """A scene from a trimesh.Trimesh or a trimesh.Scene, whose geometries may be placed several times.
 
-        Normals are taken where the trimesh object was given some, and computed else. Paths and point
-        clouds are passed over. Raises InputError for any other object.
+        Normals are taken where the trimesh object was given some, and computed else; texture coordinates,
+        colours and materials as far as a preview needs them. Paths and point clouds are passed over.
+        Raises InputError for any other object.
         """
-        if hasattr(mesh, "faces") and hasattr(mesh, "vertices"):
-            title = str(mesh.metadata.get("name") or "")
-            return cls.from_meshes([_from_trimesh(cast("trimesh.Trimesh", mesh), title)])
-        if not (hasattr(mesh, "geometry") and hasattr(mesh, "graph")):
-            raise InputError(
-                f"a {type(mesh).__name__} is no trimesh.Trimesh or trimesh.Scene. "
-                "Use Scene.from_arrays(vertices, faces) for arrays."
-            )
-        names = [name for name, part in mesh.geometry.items() if hasattr(part, "faces")]
-        number = {name: index for index, name in enumerate(names)}
-        instances = []
-        for node in mesh.graph.nodes_geometry:
-            transform, name = mesh.graph[node]
-            if name in number:
-                instances.append(Instance(mesh=number[name], transform=transform, name=str(node)))
-        meshes = tuple(_from_trimesh(mesh.geometry[name], str(name)) for name in names)
-        return cls(meshes=meshes, instances=tuple(instances))
+        from aobake.meshes.trimeshes import scene_of
+
+        return scene_of(mesh)
 
     def placed(self) -> Iterator[tuple[Instance, Mesh]]:
         """Every instance with its mesh, in order."""
@@ -216,54 +302,8 @@ class Scene:
 def _mesh(vertices: ArrayLike, faces: ArrayLike, normals: ArrayLike | None, name: str) -> Mesh:
     where = f"mesh {name!r}" if name else "mesh"
     return Mesh(
-        vertices=_array(vertices, f"{where}: vertices"),
-        faces=_array(faces, f"{where}: faces"),
-        normals=None if normals is None else _array(normals, f"{where}: normals"),
+        vertices=array_of(vertices, f"{where}: vertices"),
+        faces=array_of(faces, f"{where}: faces"),
+        normals=None if normals is None else array_of(normals, f"{where}: normals"),
         name=name,
     )
-
-
-def _array(values: ArrayLike, what: str) -> NDArray[Any]:
-    try:
-        return np.asarray(values)
-    except (TypeError, ValueError) as error:  # rows of different lengths
-        raise InputError(f"{what} are no array of numbers ({error}).") from error
-
-
-def _from_trimesh(mesh: trimesh.Trimesh, name: str) -> Mesh:
-    # vertex_normals would compute them, and merge what is sharp; the cache has them only if they were given.
-    normals = mesh._cache.cache.get("vertex_normals")  # noqa: SLF001 - there is no public way
-    return _mesh(mesh.vertices, mesh.faces, normals, name)
-
-
-def _rows(values: ArrayLike, dtype: type[ScalarT], what: str) -> NDArray[ScalarT]:
-    """(N, 3) C-ordered copy or view; InputError for any other shape or kind."""
-    try:
-        array: NDArray[ScalarT] = np.ascontiguousarray(values, dtype)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{what} are no array of numbers ({error}).") from error
-    if array.size == 0:
-        array = array.reshape(0, 3)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"{what} have the shape {array.shape}; (N, 3) is needed.")
-    return array
-
-
-def _faces(values: ArrayLike, vertices: int, where: str) -> IntArray:
-    given = np.asarray(values)
-    if given.size and given.dtype.kind not in "iu":
-        raise InputError(f"{where}: faces are {given.dtype}; whole numbers are needed.")
-    if given.size and not (int(given.min()) >= 0 and int(given.max()) < vertices):
-        flat = given.reshape(-1)
-        bad = int(np.argmax((flat < 0) | (flat >= vertices)))
-        raise InputError(
-            f"{where}: face {bad // 3} points at vertex {int(flat[bad])}; there are {vertices} vertices."
-        )
-    return _rows(given, np.int32, f"{where}: faces")
-
-
-def _frozen(array: NDArray[ScalarT]) -> NDArray[ScalarT]:
-    """A read-only view; the caller's own array stays as writable as it was."""
-    view = array.view()
-    view.flags.writeable = False
-    return view

@@ -38,6 +38,7 @@ class Surface:
     same_as : (V,) int32, the vertex whose value each one takes
     detail : (V,) float64, the size of the smallest face at each vertex
     findings : what was passed over, mended or is in doubt
+    numbers : (F',) int64, which face of the mesh each of them is; None: they are all there
     """
 
     faces: NDArray[np.uint32]
@@ -46,6 +47,7 @@ class Surface:
     same_as: NDArray[np.int32]
     detail: FloatArray
     findings: tuple[Finding, ...]
+    numbers: NDArray[np.int64] | None = None
 
 
 def surface_of(mesh: Mesh, name: str = "") -> Surface:
@@ -79,6 +81,7 @@ def surface_of(mesh: Mesh, name: str = "") -> Surface:
         same_as=same_as,
         detail=detail_at_vertices(clean, faces),
         findings=findings(name, found),
+        numbers=None if usable.all() else np.flatnonzero(usable),
     )
 
 

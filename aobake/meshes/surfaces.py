@@ -6,12 +6,12 @@ from dataclasses import replace
 
 from aobake.meshes.scene import Mesh, Scene
 from aobake.meshes.surface import Surface, surface_of
-from aobake.settings import BakeSettings
+from aobake.settings import TraceSettings
 
 __all__ = ["surfaces_of"]
 
 
-def surfaces_of(scene: Scene, settings: BakeSettings) -> list[Surface]:
+def surfaces_of(scene: Scene, settings: TraceSettings) -> list[Surface]:
     """One surface for each mesh, named in its findings as a user would name it.
 
     Raises EngineError where meshes are to be mended, and pymeshlab is missing.
@@ -23,11 +23,11 @@ def surfaces_of(scene: Scene, settings: BakeSettings) -> list[Surface]:
     ]
 
 
-def _plain(mesh: Mesh, name: str, _: BakeSettings) -> Surface:
+def _plain(mesh: Mesh, name: str, _: TraceSettings) -> Surface:
     return surface_of(mesh, name)
 
 
-def _mended(mesh: Mesh, name: str, settings: BakeSettings) -> Surface:
+def _mended(mesh: Mesh, name: str, settings: TraceSettings) -> Surface:
     from aobake.meshes.repair import mended  # loads MeshLab, half a second
 
     found = mended(mesh, settings.max_hole, name)

@@ -18,10 +18,21 @@ from numpy.typing import NDArray
 
 from aobake.errors import InputError, OutputError, nearest
 from aobake.meshes.formats.sniff import refuse_wrong_name
+from aobake.meshes.lightmap import Lightmap
 from aobake.meshes.scene import Scene
-from aobake.settings import StoreSettings
+from aobake.settings import ImageSettings, StoreSettings
 
-__all__ = ["READABLE", "WRITABLE", "check_target", "load", "write_vertex_ao"]
+__all__ = [
+    "IMAGES",
+    "READABLE",
+    "TEXTURE_WRITABLE",
+    "WRITABLE",
+    "check_target",
+    "check_texture_target",
+    "load",
+    "write_texture_ao",
+    "write_vertex_ao",
+]
 
 
 class Reader(Protocol):
@@ -29,6 +40,13 @@ class Reader(Protocol):
 
     def read(self, path: Path, *, root: Path | None, scene: str | None) -> Scene:
         """The scene in a file. Raises InputError."""
+
+
+class PoseReader(Protocol):
+    """What a format module offers when it can read an asset at a moment of an animation."""
+
+    def read(self, path: Path, *, root: Path | None, scene: str | None, pose: str) -> Scene:
+        """The scene in a file. Raises InputError, and SettingsError for what is no pose."""
 
 
 class Writer(Protocol):
@@ -49,74 +67,225 @@ class Writer(Protocol):
         """
 
 
+class BentNormalWriter(Protocol):
+    """What a format module offers when it can hold bent normals as well."""
+
+    def write(
+        self,
+        scene: Scene,
+        ao: Sequence[NDArray[np.float32]],
+        target: Path,
+        store: StoreSettings,
+        bent_normals: Sequence[NDArray[np.float32]],
+    ) -> tuple[Path, ...]:
+        """The same with bent normals: (V_i, 3) float32 per instance, in the space of its mesh."""
+
+
+class TextureWriter(Protocol):
+    """What a format module offers when it can hold a lightmap."""
+
+    def check_texture(
+        self, scene: Scene, image: ImageSettings, target: Path, lightmap: Lightmap | None = None
+    ) -> tuple[str, ...]:
+        """Raise OutputError now for what write_texture would refuse, before a long bake.
+
+        lightmap : None before there is one; with it, what its layout brings with it is said as well
+        Returns what the user should know about the result, one line each.
+        """
+
+    def write_texture(
+        self, scene: Scene, lightmap: Lightmap, target: Path, image: ImageSettings
+    ) -> tuple[Path, ...]:
+        """Write the asset with its lightmap; the files written, the target first. Raises OutputError.
+
+        Patches the document of scene.source where that is of this format, and makes a new one else.
+        """
+
+
 @dataclass(frozen=True)
 class Family:
-    """Formats that one module reads."""
+    """Formats that one module reads.
+
+    poses : whether it reads animations; bent_normals : whether it writes them
+    """
 
     module: str
     reads: tuple[str, ...]
     writes: tuple[str, ...] = ()
-    cure: str = ""
+    holds_textures: tuple[str, ...] = ()
+    poses: bool = False
+    bent_normals: bool = False
 
 
 FAMILIES = (
-    Family("gltf", reads=(".glb", ".gltf"), writes=(".glb", ".gltf")),
-    Family("obj", reads=(".obj",), writes=(".obj",)),
+    Family(
+        "gltf",
+        reads=(".glb", ".gltf"),
+        writes=(".glb", ".gltf"),
+        holds_textures=(".glb", ".gltf"),
+        poses=True,
+        bent_normals=True,
+    ),
+    Family("obj", reads=(".obj",), writes=(".obj",), holds_textures=(".obj",)),
     Family("ply", reads=(".ply",), writes=(".ply",)),
     Family("usd", reads=(".usd", ".usda", ".usdc", ".usdz"), writes=(".usda", ".usd", ".usdc")),
     Family("exchange", reads=(".stl", ".off", ".3mf", ".dae")),
 )
 READABLE = tuple(suffix for family in FAMILIES for suffix in family.reads)
 WRITABLE = tuple(suffix for family in FAMILIES for suffix in family.writes)
+TEXTURE_WRITABLE = tuple(suffix for family in FAMILIES for suffix in family.holds_textures)
+IMAGES = (".png", ".exr", ".tif", ".tiff")
 REFUSED = {
     ".fbx": "no maintained reader of FBX exists. Export it as GLB, for example from Blender.",
     ".blend": "this is Blender's own format. Export it as GLB from Blender.",
 }
 
 
-def load(path: str | Path, *, root: str | Path | None = None, scene: str | None = None) -> Scene:
+def load(
+    path: str | Path,
+    *,
+    root: str | Path | None = None,
+    scene: str | None = None,
+    pose: str | None = None,
+) -> Scene:
     """Read an asset.
 
     path : a file of a format in READABLE
     root : the folder that side files may lie in, with its subfolders; None: the asset's own folder
     scene : name or number of the glTF scene to take; None: the file's default scene
-    Returns the scene, with the source document kept whole for writing.
-    Raises InputError where the file is missing, broken, of an unknown format, or holds no triangles.
+    pose : the moment of a glTF animation to take, as CLIP@SECONDS, the clip by name or number; None: as
+        the file has it without any animation, which is the rest pose of what is skinned
+    Returns the scene, with the source document kept whole for writing: a pose changes nothing in it.
+    Raises InputError where the file is missing, broken, of an unknown format, or holds no triangles, and
+    where it has no such scene, clip or moment; SettingsError for a pose that is not CLIP@SECONDS.
     """
     path = Path(path)
     refuse_wrong_name(path)
     family = _family_of_file(path)
-    reader = cast(Reader, _module(family))
-    found = reader.read(path, root=None if root is None else Path(root), scene=scene)
+    root = None if root is None else Path(root)
+    if pose is None:
+        found = cast(Reader, _module(family.module)).read(path, root=root, scene=scene)
+    elif family.poses:
+        posing = cast(PoseReader, _module(family.module))
+        found = posing.read(path, root=root, scene=scene, pose=pose)
+    else:
+        raise InputError(
+            f"{path}: animations are read from glTF alone, and pose {pose!r} was asked for. "
+            "Leave it out, or convert the file to GLB."
+        )
     if found.triangles == 0:
         raise InputError(f"{path}: there is no triangle in it, so there is nothing to bake.")
     return found
 
 
-def check_target(scene: Scene, target: Path, store: StoreSettings) -> tuple[str, ...]:
+def check_target(
+    scene: Scene, target: Path, store: StoreSettings, *, bent_normals: bool = False
+) -> tuple[str, ...]:
     """Raise OutputError now where write_vertex_ao would refuse the target, before a long bake.
 
+    bent_normals : whether there will be some
     Returns what the user should know about the result, one line each.
     """
-    return _writer(scene, target).check(scene, store, target)
+    writer = _writer(scene, target)
+    if bent_normals:
+        _bent_normal_writer(target)
+    return writer.check(scene, store, target)
 
 
 def write_vertex_ao(
-    scene: Scene, ao: Sequence[NDArray[np.float32]], target: Path, store: StoreSettings
+    scene: Scene,
+    ao: Sequence[NDArray[np.float32]],
+    target: Path,
+    store: StoreSettings,
+    bent_normals: Sequence[NDArray[np.float32]] | None = None,
 ) -> tuple[Path, ...]:
     """Write the scene's asset with ambient occlusion at its vertices; the files written, the target first.
 
     ao : one (V_i,) float32 array per instance of the scene, in its order
+    bent_normals : one (V_i, 3) float32 array per instance, in the space of its mesh; or None
     Raises OutputError where the format cannot hold it or the file cannot be written.
     """
-    return _writer(scene, target).write(scene, ao, target, store)
+    writer = _writer(scene, target)
+    if bent_normals is None:
+        return writer.write(scene, ao, target, store)
+    return _bent_normal_writer(target).write(scene, ao, target, store, bent_normals)
+
+
+def _bent_normal_writer(target: Path) -> BentNormalWriter:
+    suffix = target.suffix.lower()
+    for family in FAMILIES:
+        if suffix in family.writes and family.bent_normals:
+            return cast(BentNormalWriter, _module(family.module))
+    raise OutputError(
+        f"{target}: {suffix[1:].upper()} is not written with bent normals. "
+        "Write GLB instead (-o NAME.glb), or leave them out."
+    )
+
+
+def check_texture_target(
+    scene: Scene, target: Path, image: ImageSettings, lightmap: Lightmap | None = None
+) -> tuple[str, ...]:
+    """Raise OutputError now where write_texture_ao would refuse the target, before a long bake.
+
+    lightmap : None before there is one; with it, what its layout brings with it is said as well
+    Returns what the user should know about the result, one line each.
+    """
+    if lightmap is not None:
+        _check_lightmap(scene, lightmap)
+    return _texture_writer(scene, target).check_texture(scene, image, target, lightmap)
+
+
+def write_texture_ao(
+    scene: Scene, lightmap: Lightmap, target: Path, image: ImageSettings
+) -> tuple[Path, ...]:
+    """Write the scene's asset with its lightmap; the files written, the target first.
+
+    target : an asset of TEXTURE_WRITABLE, or an image of IMAGES alone
+    Raises OutputError where the format cannot hold it or the file cannot be written.
+    """
+    _check_lightmap(scene, lightmap)
+    return _texture_writer(scene, target).write_texture(scene, lightmap, target, image)
+
+
+def _check_lightmap(scene: Scene, lightmap: Lightmap) -> None:
+    """Raise OutputError where a lightmap is not one of this scene."""
+    if len(lightmap.placings) != len(scene.instances):
+        raise OutputError(
+            f"the lightmap places {len(lightmap.placings)} instances, and the scene has "
+            f"{len(scene.instances)}. Bake the scene as it was read."
+        )
+    for instance, placing in zip(scene.instances, lightmap.placings, strict=True):
+        if placing is not None and not 0 <= placing.page < len(lightmap.pages):
+            raise OutputError(
+                f"instance {instance.name!r} is on image {placing.page} of the lightmap, which has "
+                f"{len(lightmap.pages)}."
+            )
+
+
+def _texture_writer(scene: Scene, target: Path) -> TextureWriter:
+    suffix = target.suffix.lower()
+    for family in FAMILIES:
+        if suffix in family.holds_textures:
+            return cast(TextureWriter, _module(family.module))
+    if suffix in IMAGES:
+        return cast(TextureWriter, _module("image_alone"))
+    was = f" {scene.source.path.name} was read as {scene.source.format}." if scene.source else ""
+    if suffix in READABLE or suffix in REFUSED:
+        raise OutputError(
+            f"{target}: {suffix[1:].upper()} cannot hold a lightmap.{was} Write GLB or OBJ (-o NAME.glb), "
+            "or the image alone (-o NAME.png)."
+        )
+    raise OutputError(
+        f"{target}: {suffix or 'a name without an ending'} is no format that can be written.{was}"
+        f"{nearest(suffix, (*TEXTURE_WRITABLE, *IMAGES))}"
+    )
 
 
 def _writer(scene: Scene, target: Path) -> Writer:
     suffix = target.suffix.lower()
     for family in FAMILIES:
         if suffix in family.writes:
-            return cast(Writer, _module(family))
+            return cast(Writer, _module(family.module))
     if suffix == ".usdz":
         raise OutputError(
             f"{target}: a package is not written; the result is a layer over the file. "
@@ -146,5 +315,5 @@ def _family_of_file(path: Path) -> Family:
     )
 
 
-def _module(family: Family) -> object:
-    return importlib.import_module(f"{__name__}.{family.module}")
+def _module(name: str) -> object:
+    return importlib.import_module(f"{__name__}.{name}")

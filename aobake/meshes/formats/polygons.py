@@ -8,54 +8,48 @@ from numpy.typing import NDArray
 from aobake.meshes.formats.earclip import clip_ears
 from aobake.meshes.scene import FloatArray, IntArray
 
-__all__ = ["strip_triangles", "triangulate"]
+__all__ = ["strip_triangles", "triangle_corners"]
 
 IndexArray = NDArray[np.int64]
 
 
-def triangulate(vertices: FloatArray, corners: IndexArray, sizes: IndexArray) -> IntArray:
-    """Split polygons into triangles of the same winding, in the order of the polygons.
+def triangle_corners(vertices: FloatArray, corners: IndexArray, sizes: IndexArray) -> IntArray:
+    """Split polygons into triangles of the same winding, and say which corners these have.
 
     vertices : (V, 3) float64; where they are not finite, the polygon becomes a fan
     corners : (sum of sizes,) vertices of all polygons, one polygon after the other
     sizes : (P,) corners of each polygon; one of fewer than three gives nothing
-    Returns (T, 3) int32; (0, 3) where there is no polygon. A polygon is a fan from its first corner where
-    that covers it, and is cut along its ears else (Meisters 1975); one that crosses itself is covered
-    in some way that uses its corners alone.
+    Returns (T, 3) int32 into corners; (0, 3) where there is no polygon. A polygon is a fan from its first
+    corner where that covers it, and is cut along its ears else (Meisters 1975); one that crosses itself is
+    covered in some way that uses its corners alone.
     """
     counts = np.maximum(sizes - 2, 0)
     first = np.cumsum(counts) - counts
     begin = np.cumsum(sizes) - sizes
-    faces = np.empty((int(counts.sum()), 3), np.int32)
+    found = np.empty((int(counts.sum()), 3), np.int32)
     for size in np.unique(sizes[sizes >= 3]).tolist():
         chosen = np.flatnonzero(sizes == size)
         polygons = corners[begin[chosen][:, None] + np.arange(size)]
         rows = first[chosen][:, None] + np.arange(size - 2)
-        faces[rows] = _of_one_size(vertices, polygons)
-    return faces
+        found[rows] = begin[chosen][:, None, None] + _of_one_size(vertices, polygons)
+    return found
 
 
 def _of_one_size(vertices: FloatArray, polygons: IndexArray) -> IndexArray:
-    """(K, size - 2, 3) triangles of (K, size) polygons."""
-    size = polygons.shape[1]
-    fan = np.stack(
-        [
-            np.broadcast_to(polygons[:, :1], (len(polygons), size - 2)),
-            polygons[:, 1:-1],
-            polygons[:, 2:],
-        ],
-        axis=2,
-    )
+    """(K, size - 2, 3) triangles of (K, size) polygons, as numbers of their corners from 0."""
+    count, size = polygons.shape
+    fan = np.array([[0, corner, corner + 1] for corner in range(1, size - 1)], np.int64)
+    cut = np.broadcast_to(fan, (count, *fan.shape))
     if size == 3:
-        return fan
+        return cut
     folded = np.flatnonzero(_folds(vertices, polygons))
+    cut = cut.copy()
     if size == 4:
-        a, b, c, d = polygons[folded].T
-        fan[folded] = np.stack([np.stack([a, b, d], 1), np.stack([b, c, d], 1)], 1)
-        return fan
+        cut[folded] = [[0, 1, 3], [1, 2, 3]]
+        return cut
     for polygon in folded.tolist():
-        fan[polygon] = polygons[polygon][clip_ears(vertices[polygons[polygon]])]
-    return fan
+        cut[polygon] = clip_ears(vertices[polygons[polygon]])
+    return cut
 
 
 def _folds(vertices: FloatArray, polygons: IndexArray) -> NDArray[np.bool_]:

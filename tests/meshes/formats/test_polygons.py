@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-from aobake.meshes.formats.polygons import strip_triangles, triangulate
+from aobake.meshes.formats.polygons import strip_triangles, triangle_corners
 
 Points = NDArray[np.float64]
 ARROW = [[0, 0], [2, 1], [0, 2], [0.5, 1]]
@@ -48,7 +48,7 @@ def test_a_polygon_is_covered_exactly_once_from_any_first_corner(
     shoelace = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
     for start in range(len(outline)):
         points = placed(outline, start)
-        faces = triangulate(points, np.arange(len(points)), np.array([len(points)]))
+        faces = triangle_corners(points, np.arange(len(points)), np.array([len(points)]))
         signed = areas(points, faces) * (-1 if turned else 1)
         assert len(faces) == len(points) - 2
         assert signed.min() > -1e-12
@@ -58,28 +58,30 @@ def test_a_polygon_is_covered_exactly_once_from_any_first_corner(
 def test_polygons_of_many_sizes_keep_their_order() -> None:
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [-1, 0.5, 0]], float)
     corners = np.array([0, 1, 2, 3, 0, 1, 0, 1, 2, 0, 1, 2, 3, 4])
-    faces = triangulate(points, corners, np.array([4, 2, 3, 5]))
-    assert_array_equal(faces, [[0, 1, 2], [0, 2, 3], [0, 1, 2], [0, 1, 2], [0, 2, 3], [0, 3, 4]])
-    assert faces.dtype == np.int32
+    found = triangle_corners(points, corners, np.array([4, 2, 3, 5]))
+    assert_array_equal(
+        corners[found], [[0, 1, 2], [0, 2, 3], [0, 1, 2], [0, 1, 2], [0, 2, 3], [0, 3, 4]]
+    )
+    assert found.dtype == np.int32
 
 
 def test_no_polygon_gives_no_triangle() -> None:
     none = np.zeros(0, np.int64)
-    assert triangulate(np.zeros((0, 3)), none, none).shape == (0, 3)
+    assert triangle_corners(np.zeros((0, 3)), none, none).shape == (0, 3)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 def test_corners_that_are_not_finite_give_triangles_of_the_polygon(bad: float) -> None:
     points = placed(COMB, 3)
     points[4] = bad
-    faces = triangulate(points, np.arange(10), np.array([10]))
+    faces = triangle_corners(points, np.arange(10), np.array([10]))
     assert faces.shape == (8, 3)
     assert set(faces.reshape(-1).tolist()) <= set(range(10))
 
 
 def test_a_polygon_that_crosses_itself_still_ends() -> None:
     star = [[np.sin(4 * np.pi * k / 7), np.cos(4 * np.pi * k / 7)] for k in range(7)]
-    faces = triangulate(placed(star, 0), np.arange(7), np.array([7]))
+    faces = triangle_corners(placed(star, 0), np.arange(7), np.array([7]))
     assert faces.shape == (5, 3)
 
 

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from aobake.meshes.formats.gltf.read import read
-from aobake.meshes.formats.gltf.write import check, write
+from aobake.meshes.formats.gltf.write import check, check_texture, write, write_texture
 
-__all__ = ["check", "read", "write"]
+__all__ = ["check", "check_texture", "read", "write", "write_texture"]

@@ -11,12 +11,12 @@ from aobake.errors import InputError
 from aobake.meshes.formats.gltf.document import Document
 from aobake.meshes.formats.gltf.element import Element
 
-__all__ = ["COMPONENTS", "AccessorReader", "Numbers", "accessor_dtype", "decoded"]
+__all__ = ["COMPONENTS", "SHAPES", "AccessorReader", "Numbers", "accessor_dtype", "decoded"]
 
 Numbers: TypeAlias = NDArray[Any]
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-SHAPES = {
+SHAPES = {  # columns and rows
     "SCALAR": (1, 1),
     "VEC2": (1, 2),
     "VEC3": (1, 3),

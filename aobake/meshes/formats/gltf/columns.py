@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from aobake.meshes.formats.gltf.places import Vertices
+
 __all__ = ["ColumnPool"]
 
 Column = NDArray[np.generic]
@@ -43,14 +45,16 @@ class ColumnPool:
         self._used: list[Mask] = []
         self._domains: dict[Hashable, _Domain] = {}
 
-    def place(self, domain: Hashable, values: Column, used: Mask, *, alone: bool) -> int:
-        """Number of the column that gives every used vertex its value.
+    def place(self, vertices: Vertices, values: Column, faces: NDArray[np.int32]) -> int:
+        """Number of the column that gives every vertex of the faces its value.
 
-        domain : names the vertices
-        values : (V, components), as stored;  used : (V,)
-        alone : whether one primitive only has these vertices, so that no other column could fit
+        values : (V, components), as stored;  faces : (F, 3) int32
         """
-        found = self._domains.setdefault(domain, _Domain())
+        alone = vertices.alone  # no other column could fit, so what is used does not matter
+        used = np.zeros(0 if alone else len(values), np.bool_)
+        if not alone:
+            used[faces] = True
+        found = self._domains.setdefault(vertices.domain, _Domain())
         digest = hashlib.blake2b(np.ascontiguousarray(values).data)
         digest.update(b"" if alone else np.packbits(used).tobytes())
         key = digest.digest()

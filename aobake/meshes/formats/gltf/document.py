@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from aobake.errors import InputError
+from aobake.errors import InputError, nearest
 from aobake.files import read_bytes
 from aobake.meshes.formats.gltf import uris
 from aobake.meshes.formats.gltf.container import Container, open_container
@@ -75,6 +75,17 @@ class Document:
         """Every entry of a list of KINDS."""
         for number in range(self.size(name)):
             yield self.entry(name, number)
+
+    def find(self, name: str, asked: str) -> int:
+        """The entry of a list of KINDS with a name, or else with a number. Raises InputError."""
+        names = [entry.name for entry in self.entries(name)]
+        if asked in names:
+            return names.index(asked)
+        if asked.isdecimal() and int(asked) < len(names):
+            return int(asked)
+        known = [*filter(None, names), *map(str, range(len(names)))]
+        found = nearest(asked, known) if known else " It has none."
+        raise InputError(f"{self.path}: there is no {KINDS[name]} {asked!r}.{found}")
 
     def label(self, name: str, number: int) -> str:
         """'mesh 3 "wheel"'."""

@@ -7,6 +7,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from aobake.meshes.formats.gltf.accessors import SHAPES
 from aobake.meshes.formats.gltf.container import Bytes, padding
 from aobake.meshes.formats.gltf.document import Document
 from aobake.meshes.formats.gltf.jsontext import JsonObject
@@ -26,7 +27,8 @@ COMPONENT_OF = {
     "float32": 5126,
 }
 TYPE_OF = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
-ARRAY_BUFFER = 34962
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+LARGEST_UINT16 = 65535
 
 
 class Edit:
@@ -75,13 +77,7 @@ class Edit:
         parts : the components that each of them reads. Each element starts at a multiple of 4 bytes.
         """
         count, width = column.shape
-        spare = padding(width * column.itemsize) // column.itemsize
-        if spare:
-            column = np.concatenate([column, np.zeros((count, spare), column.dtype)], axis=1)
-        data = np.ascontiguousarray(column).data.cast("B") if count else b""
-        view = self.add_view(
-            data, byteStride=(width + spare) * column.itemsize, target=ARRAY_BUFFER
-        )
+        view = self._add_column(column, 1)
         numbers = []
         for part in parts:
             first, end, _ = part.indices(width)
@@ -92,3 +88,34 @@ class Edit:
             accessor |= {"count": count, "type": TYPE_OF[end - first]}
             numbers.append(self.append("accessors", accessor))
         return tuple(numbers)
+
+    def add_attribute(self, values: NDArray[np.generic], entry: JsonObject) -> int:
+        """A new vertex attribute; its number.
+
+        values : (V, components) as stored, columns of matrices without padding
+        entry : its accessor, as far as it does not say where the values lie
+        """
+        columns, _ = SHAPES[str(entry["type"])]
+        view = self._add_column(values, columns)
+        return self.append("accessors", {**entry, "bufferView": view, "count": len(values)})
+
+    def add_indices(self, corners: NDArray[np.integer], vertices: int) -> int:
+        """A new accessor of indices below `vertices`, as narrow as they can be; its number."""
+        narrow = vertices <= LARGEST_UINT16  # the largest number itself restarts a primitive
+        flat = np.ascontiguousarray(corners, np.uint16 if narrow else np.uint32).reshape(-1)
+        view = self.add_view(flat.data.cast("B") if len(flat) else b"", target=ELEMENT_ARRAY_BUFFER)
+        kind = COMPONENT_OF[flat.dtype.name]
+        return self.append(
+            "accessors",
+            {"bufferView": view, "componentType": kind, "count": len(flat), "type": "SCALAR"},
+        )
+
+    def _add_column(self, values: NDArray[np.generic], columns: int) -> int:
+        """A view of (V, components), where every element and every column of a matrix starts at 4 bytes."""
+        rows = values.reshape(len(values), columns, values.shape[1] // columns)
+        spare = padding(rows.shape[2] * values.itemsize) // values.itemsize
+        if spare:
+            rows = np.pad(rows, ((0, 0), (0, 0), (0, spare)))
+        data = np.ascontiguousarray(rows).data.cast("B") if rows.size else b""
+        stride = columns * rows.shape[2] * values.itemsize
+        return self.add_view(data, byteStride=stride, target=ARRAY_BUFFER)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from aobake.meshes.formats.gltf import uris
 from aobake.meshes.formats.gltf.document import Document, side_uris
 from aobake.meshes.formats.gltf.element import Element
@@ -45,7 +47,7 @@ def facts(source: GltfSource) -> Mapping[str, object]:
         "attributes": sorted({name for p in primitives for name in p.needed("attributes").value}),
         "morph targets": max((len(p.list_of("targets")) for p in primitives), default=0),
         "skins": document.size("skins"),
-        "animations": document.size("animations"),
+        "animations": [_clip(document, number) for number in range(document.size("animations"))],
         "cameras": document.size("cameras"),
         "extensions used": _strings(document, "extensionsUsed"),
         "extensions required": _strings(document, "extensionsRequired"),
@@ -85,6 +87,17 @@ def _names(document: Document, name: str) -> list[str]:
         f'{number} "{entry.name}"' if entry.name else str(number)
         for number, entry in enumerate(document.entries(name))
     ]
+
+
+def _clip(document: Document, number: int) -> str:
+    """Its number, its name where it has one, and the seconds that it lasts where the file says so."""
+    clip = document.entry("animations", number)
+    ends: list[float] = []
+    for sampler in clip.children("samplers", "sampler"):
+        times = sampler.index("input", document.size("accessors"), "accessors")
+        ends += document.entry("accessors", times).numbers("max")[:1]
+    named = f'{number} "{clip.name}"' if clip.name else str(number)
+    return f"{named} ({np.float32(max(ends))!s} s)" if ends else named
 
 
 def _strings(document: Document, key: str) -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from itertools import count, takewhile
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,7 @@ from aobake.meshes.formats.gltf.jsontext import JsonObject, JsonText
 from aobake.meshes.formats.gltf.source import Binding, GltfSource
 from aobake.meshes.scene import Instance, Material, Mesh, Scene
 
-__all__ = ["fresh_source"]
+__all__ = ["fresh_source", "in_stored_space"]
 
 FloatArray = NDArray[np.float64]
 BIN = 0x004E4942
@@ -48,6 +50,23 @@ def fresh_source(scene: Scene, target: Path) -> GltfSource:
     container = Container(is_glb=True, text=b"", chunks=chunks)
     document = Document(target, None, container, json, JsonText(b""))
     return GltfSource(document, tuple(bindings), 0 if nodes else None)
+
+
+def in_stored_space(
+    scene: Scene, directions: Sequence[NDArray[np.float32]]
+) -> list[NDArray[np.float32]]:
+    """Directions in the spaces of a scene's meshes, in those that the file has for them.
+
+    directions : (V_i, 3) of each instance, turned like normals
+    """
+    if isinstance(scene.source, GltfSource):
+        return list(directions)
+    return [
+        own
+        if _is_trs(instance.transform)
+        else _unit(own @ np.linalg.pinv(instance.transform[:3, :3])).astype(np.float32)
+        for instance, own in zip(scene.instances, directions, strict=True)
+    ]
 
 
 class _Builder:
@@ -92,6 +111,8 @@ class _Builder:
         attributes: JsonObject = {"POSITION": self._column(positions, bounds=True)}
         if normals is not None and len(normals):
             attributes["NORMAL"] = self._column(_unit(normals).astype(np.float32))
+        for name, values in _of_vertices(mesh):
+            attributes[name] = self._column(values)
         primitive: JsonObject = {
             "attributes": attributes,
             "indices": self._indices(faces, len(vertices)),
@@ -104,7 +125,8 @@ class _Builder:
 
     def _column(self, values: NDArray[np.float32], *, bounds: bool = False) -> int:
         accessor: JsonObject = {"bufferView": self._view(values.tobytes(), ARRAY_BUFFER)}
-        accessor |= {"componentType": 5126, "count": len(values), "type": "VEC3"}
+        accessor |= {"componentType": 5126, "count": len(values)}
+        accessor["type"] = f"VEC{values.shape[1]}"
         if bounds:
             accessor["min"] = [float(value) for value in values.min(axis=0)]
             accessor["max"] = [float(value) for value in values.max(axis=0)]
@@ -129,6 +151,18 @@ class _Builder:
         self.data += data + b"\0" * padding(len(data))
         self.views.append(view)
         return len(self.views) - 1
+
+
+def _of_vertices(mesh: Mesh) -> Iterator[tuple[str, NDArray[np.float32]]]:
+    """Colours and texture coordinates that belong to vertices, the latter numbered without a gap."""
+
+    def kept(name: str) -> bool:
+        found = mesh.attributes.get(name)
+        return found is not None and found.corners is None and len(found.values) > 0
+
+    sets = takewhile(kept, (f"TEXCOORD_{n}" for n in count()))
+    for name in (*filter(kept, ["COLOR_0"]), *sets):
+        yield name, np.nan_to_num(mesh.attributes[name].values).astype(np.float32)
 
 
 def _centre(vertices: FloatArray) -> FloatArray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,10 +11,16 @@ from numpy.typing import NDArray
 
 from aobake.errors import InputError
 from aobake.meshes.formats.gltf import draco
-from aobake.meshes.formats.gltf.accessors import AccessorReader, Numbers, accessor_dtype, decoded
+from aobake.meshes.formats.gltf.accessors import (
+    SHAPES,
+    AccessorReader,
+    Numbers,
+    accessor_dtype,
+    decoded,
+)
 from aobake.meshes.formats.gltf.element import Element
 
-__all__ = ["TRIANGLE_MODES", "Geometry", "PrimitiveReader", "corners"]
+__all__ = ["TRIANGLE_MODES", "Geometry", "PrimitiveReader", "corners", "is_morphed"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -88,7 +96,7 @@ class PrimitiveReader:
             return self.reader.values(number, types)
         accessor = self.reader.accessor(number)
         values, kind = packed.attributes[name], accessor.text("type")
-        if kind not in types or values.shape[1] != int(types[types.index(kind)][-1]):
+        if kind not in types or values.shape[1] != math.prod(SHAPES[kind]):
             raise InputError(
                 f"{primitive.where}: {name} is {kind[:20]} with {values.shape[1]} numbers in the Draco stream; "
                 f"{' or '.join(types)} is needed."
@@ -149,11 +157,8 @@ class PrimitiveReader:
     def _morphed(
         self, values: FloatArray, name: str, primitive: Element, weights: tuple[float, ...]
     ) -> FloatArray:
-        targets = primitive.children("targets", "target")
         moved: FloatArray | None = None
-        for target, weight in zip(targets, weights, strict=False):
-            if weight == 0.0 or name not in target:
-                continue
+        for target, weight in _active_targets(primitive, name, weights):
             number = self._accessor(target, name)
             delta = self.reader.floats(number, ("VEC3",))
             if len(delta) != len(values):
@@ -167,6 +172,20 @@ class PrimitiveReader:
 
     def _accessor(self, attributes: Element, name: str) -> int:
         return attributes.index(name, self.reader.document.size("accessors"), "accessors")
+
+
+def _active_targets(
+    primitive: Element, name: str, weights: tuple[float, ...]
+) -> Iterator[tuple[Element, float]]:
+    """The morph targets that move an attribute, with their weights."""
+    for target, weight in zip(primitive.children("targets", "target"), weights, strict=False):
+        if weight != 0.0 and name in target:
+            yield target, weight
+
+
+def is_morphed(primitive: Element, name: str, weights: tuple[float, ...]) -> bool:
+    """Whether a morph target moves an attribute with these weights."""
+    return any(True for _ in _active_targets(primitive, name, weights))
 
 
 def _checked(indices: NDArray[np.generic], vertices: int, where: str) -> IntArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import urllib.parse
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -93,7 +94,7 @@ def place_bytes(layout: Layout, edit: Edit) -> tuple[list[Bytes] | None, dict[Pa
         entry["byteLength"] = size
     files: dict[Path, list[Bytes]] = {}
     if layout.home == "file":
-        beside = free_name(layout.target, document)
+        beside = free_name(layout.target, document, ".bin")
         entry = {"uri": urllib.parse.quote(beside.name), **entry}
         files[beside] = content
     elif layout.home == "data":
@@ -111,10 +112,11 @@ def _old_binary(layout: Layout, document: Document) -> list[Bytes] | None:
     return [binary] if layout.glb and binary is not None and layout.buffer != 0 else None
 
 
-def free_name(target: Path, document: Document) -> Path:
-    """A name beside the target for the new buffer: one that is free, or that an earlier bake took for it.
+def free_name(target: Path, document: Document, ending: str, taken: Collection[Path] = ()) -> Path:
+    """A name beside the target for new bytes: one that is free, or that an earlier bake took for them.
 
-    A file that the source document itself needs is never taken.
+    taken : names given away already
+    A file that the source document itself needs is never taken. Raises OutputError.
     """
     needed = {side.path.resolve() for side in document.side_files().values()}
     needed |= {
@@ -124,12 +126,12 @@ def free_name(target: Path, document: Document) -> Path:
     }
     earlier = known_uris(target)
     for number in range(1, 1000):
-        path = target.with_name(f"{target.stem}_ao{number if number > 1 else ''}.bin")
-        if path.resolve() in needed:
+        path = target.with_name(f"{target.stem}_ao{number if number > 1 else ''}{ending}")
+        if path in taken or path.resolve() in needed:
             continue
         if not path.exists() or urllib.parse.quote(path.name) in earlier:
             return path
-    raise OutputError(f"{target}: every name for its buffer is taken. Write it somewhere else.")
+    raise OutputError(f"{target}: every name for its {ending} is taken. Write it somewhere else.")
 
 
 def _plain(uri: str) -> bool:

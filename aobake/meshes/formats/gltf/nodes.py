@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.errors import InputError, nearest
+from aobake.errors import InputError
 from aobake.meshes.formats.gltf.accessors import AccessorReader
 from aobake.meshes.formats.gltf.document import Document
 from aobake.meshes.formats.gltf.element import Element
@@ -33,10 +34,9 @@ class NodeTree:
     world: NDArray[np.float64]
 
 
-def node_tree(document: Document) -> NodeTree:
-    """The nodes with their places. Raises InputError where they are no tree."""
-    count = document.size("nodes")
-    nodes = list(document.entries("nodes"))
+def node_tree(nodes: Sequence[Element]) -> NodeTree:
+    """The nodes of a document with their places. Raises InputError where they are no tree."""
+    count = len(nodes)
     children = [node.indices("children", count, "nodes") for node in nodes]
     parents = _parents(children, nodes)
     roots = [number for number in range(count) if parents[number] is None]
@@ -56,7 +56,7 @@ def node_tree(document: Document) -> NodeTree:
     return NodeTree(children, roots, world)
 
 
-def _parents(children: list[list[int]], nodes: list[Element]) -> list[int | None]:
+def _parents(children: list[list[int]], nodes: Sequence[Element]) -> list[int | None]:
     parents: list[int | None] = [None] * len(nodes)
     for number, below in enumerate(children):
         for child in below:
@@ -69,7 +69,7 @@ def _parents(children: list[list[int]], nodes: list[Element]) -> list[int | None
     return parents
 
 
-def _refuse_cycle(parents: list[int | None], nodes: list[Element]) -> None:
+def _refuse_cycle(parents: list[int | None], nodes: Sequence[Element]) -> None:
     """Raise InputError naming a node that stands below itself."""
     settled: set[int] = set()
     for start in range(len(nodes)):
@@ -157,20 +157,13 @@ def gpu_instances(reader: AccessorReader, node: Element) -> NDArray[np.float64] 
 
 def chosen_scene(document: Document, scene: str | None) -> int | None:
     """The number of a scene by name or number; the default one for None; None where there are no scenes."""
-    scenes = list(document.entries("scenes"))
     if scene is None:
-        if not scenes:
+        count = document.size("scenes")
+        if not count:
             return None
-        default = document.top.maybe_index("scene", len(scenes), "scenes")
+        default = document.top.maybe_index("scene", count, "scenes")
         return 0 if default is None else default
-    names = [entry.name for entry in scenes]
-    if scene in names:
-        return names.index(scene)
-    if scene.isdecimal() and int(scene) < len(scenes):
-        return int(scene)
-    known = [*(name for name in names if name), *(str(number) for number in range(len(scenes)))]
-    found = nearest(scene, known) if known else " It has none."
-    raise InputError(f"{document.path}: there is no scene {scene!r}.{found}")
+    return document.find("scenes", scene)
 
 
 def shown_nodes(document: Document, tree: NodeTree, scene: int | None) -> list[int]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.meshes.formats.gltf.edit import Edit
-from aobake.meshes.formats.gltf.stores import Place
+from aobake.meshes.formats.gltf.places import Key, Place
 
 __all__ = ["AO", "AttributeStore"]
 
@@ -30,5 +30,5 @@ class AttributeStore:
         """_AO: names of applications begin with an underscore."""
         return (AO,)
 
-    def finish(self, edit: Edit, places: dict[tuple[int, int], Place]) -> None:
+    def finish(self, edit: Edit, places: dict[Key, Place]) -> None:
         """Nothing else changes."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from aobake.errors import InputError, OutputError
 from aobake.meshes.formats.gltf.edit import Edit
-from aobake.meshes.formats.gltf.stores import Place
+from aobake.meshes.formats.gltf.places import Key, Place
 
 __all__ = ["ColorStore"]
 
@@ -46,7 +46,7 @@ class ColorStore:
         """COLOR_0."""
         return (NAME,)
 
-    def finish(self, edit: Edit, places: dict[tuple[int, int], Place]) -> None:
+    def finish(self, edit: Edit, places: dict[Key, Place]) -> None:
         """Nothing else changes."""
 
     def _existing(self, place: Place) -> NDArray[np.generic] | None:

@@ -8,23 +8,19 @@ later bake finds the set that it may replace. Floats, since attributes start at 
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 from numpy.typing import NDArray
 
 from aobake.errors import OutputError
-from aobake.meshes.formats.gltf.edit import Edit
-from aobake.meshes.formats.gltf.element import Element
+from aobake.meshes.formats.gltf.edit import NAME, Edit
 from aobake.meshes.formats.gltf.gradient import coordinate, gradient_png
-from aobake.meshes.formats.gltf.jsontext import JsonObject
+from aobake.meshes.formats.gltf.looks import Look, give_looks, with_occlusion
+from aobake.meshes.formats.gltf.places import Key, Place
 from aobake.meshes.formats.gltf.store_attribute import AO
-from aobake.meshes.formats.gltf.stores import Place
 
 __all__ = ["OcclusionStore", "free_set"]
 
 MOST_SETS = 8
-VARIANTS = "KHR_materials_variants"
 CLAMP_TO_EDGE, LINEAR = 33071, 9729
 
 
@@ -72,97 +68,23 @@ class OcclusionStore:
         """The first TEXCOORD_n that is free, and _AO."""
         return f"TEXCOORD_{free_set(place)}", AO
 
-    def finish(self, edit: Edit, places: dict[tuple[int, int], Place]) -> None:
+    def finish(self, edit: Edit, places: dict[Key, Place]) -> None:
         """Give every primitive a material whose occlusion texture reads its new set."""
         if not places:
             return
-        sets = {key: free_set(place) for key, place in places.items()}
-        chosen = _materials(edit, _uses(edit, sets), _texture(edit))
-        meshes = edit.entries("meshes")
-        for (mesh, number), level in sets.items():
-            primitives = list(cast(list[JsonObject], meshes[mesh]["primitives"]))
-            primitives[number] = _repointed(primitives[number], level, chosen)
-            meshes[mesh] = {**meshes[mesh], "primitives": primitives}
+        texture = _texture(edit)
+        looks = {key: Look(0, free_set(place)) for key, place in places.items()}
+        give_looks(
+            edit, looks, lambda material, look: with_occlusion(material, texture, look.uv_set)
+        )
 
 
 def _texture(edit: Edit) -> int:
     """The gradient as a new texture; its number."""
     view = edit.add_view(gradient_png())
-    image = edit.append(
-        "images", {"bufferView": view, "mimeType": "image/png", "name": "ambient occlusion"}
-    )
+    image = edit.append("images", {"bufferView": view, "mimeType": "image/png", "name": NAME})
     sampler = edit.append(
         "samplers",
         {"magFilter": LINEAR, "minFilter": LINEAR, "wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE},
     )
     return edit.append("textures", {"sampler": sampler, "source": image})
-
-
-def _uses(edit: Edit, sets: dict[tuple[int, int], int]) -> dict[int | None, dict[int | None, None]]:
-    """Material (None: the default one) -> the new sets that it is used with (None: without), in order."""
-    found: dict[int | None, dict[int | None, None]] = {}
-    for mesh, entry in enumerate(edit.entries("meshes")):
-        whole = Element(entry, f"{edit.document.path}: mesh {mesh}")
-        for number, primitive in enumerate(whole.children("primitives", "primitive")):
-            for material in _named(primitive):
-                found.setdefault(material, {})[sets.get((mesh, number))] = None
-    return found
-
-
-def _named(primitive: Element) -> list[int | None]:
-    """Every material that a primitive names, those of its variants included."""
-    found = [primitive.maybe_integer("material")]
-    variants = primitive.extension(VARIANTS)
-    if variants:
-        found += [
-            mapping.integer("material") for mapping in variants.children("mappings", "mapping")
-        ]
-    return found
-
-
-def _materials(
-    edit: Edit, uses: dict[int | None, dict[int | None, None]], texture: int
-) -> dict[tuple[int | None, int], int]:
-    """(material, new set) -> the material that reads the set: the same one, or a copy."""
-    chosen: dict[tuple[int | None, int], int] = {}
-    materials = edit.entries("materials")
-    for material, levels in uses.items():
-        if material is not None and material >= len(materials):
-            raise OutputError(
-                f"{edit.document.path}: material {material} does not exist. Export it again."
-            )
-        keep = material is None or None in levels
-        for level in levels:
-            if level is None:
-                continue
-            look: JsonObject = (
-                {"index": texture, "texCoord": level} if level else {"index": texture}
-            )
-            before: JsonObject = {} if material is None else materials[material]
-            if material is None or keep:
-                name = before.get("name")
-                renamed: JsonObject = {"name": f"{name}_ao"} if isinstance(name, str) else {}
-                copy = {**before, **renamed, "occlusionTexture": look}
-                chosen[material, level] = edit.append("materials", copy)
-            else:
-                materials[material] = {**before, "occlusionTexture": look}
-                chosen[material, level] = material
-                keep = True  # another set needs a copy
-    return chosen
-
-
-def _repointed(
-    primitive: JsonObject, level: int, chosen: dict[tuple[int | None, int], int]
-) -> JsonObject:
-    """A copy of a primitive whose materials read its new set."""
-    element = Element(primitive, "primitive")
-    result = {**primitive, "material": chosen[element.maybe_integer("material"), level]}
-    variants = element.extension(VARIANTS)
-    if variants:
-        mappings = [
-            {**mapping.value, "material": chosen[mapping.integer("material"), level]}
-            for mapping in variants.children("mappings", "mapping")
-        ]
-        extensions = cast(JsonObject, primitive["extensions"])
-        result["extensions"] = {**extensions, VARIANTS: {**variants.value, "mappings": mappings}}
-    return result

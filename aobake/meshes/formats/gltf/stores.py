@@ -2,29 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aobake.meshes.formats.gltf.edit import Edit
-from aobake.meshes.formats.gltf.element import Element
-from aobake.meshes.formats.gltf.geometry import PrimitiveReader
+from aobake.meshes.formats.gltf.places import Key, Place
 
-__all__ = ["Place", "Store"]
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """A primitive that is to hold ambient occlusion.
-
-    label : 'mesh 3 "wheel" primitive 0', for messages
-    """
-
-    reader: PrimitiveReader
-    primitive: Element
-    label: str
+__all__ = ["Store"]
 
 
 class Store(Protocol):
@@ -45,5 +31,5 @@ class Store(Protocol):
     def names(self, place: Place) -> tuple[str, ...]:
         """The attributes that read the column, one for each of the parts."""
 
-    def finish(self, edit: Edit, places: dict[tuple[int, int], Place]) -> None:
+    def finish(self, edit: Edit, places: dict[Key, Place]) -> None:
         """What is to be changed beyond the attributes; places: (mesh, primitive) of the new JSON -> its place."""

@@ -2,41 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from aobake.errors import InputError
+from aobake.meshes.formats.gltf.document import Document
 from aobake.meshes.formats.gltf.edit import NAME
+from aobake.meshes.formats.gltf.element import Element
+from aobake.meshes.formats.gltf.looks import materials_of
 from aobake.meshes.formats.gltf.nodes import INSTANCING
+from aobake.meshes.formats.gltf.places import Key, Place
 from aobake.meshes.formats.gltf.source import GltfSource
-from aobake.meshes.formats.gltf.store_occlusion import free_set
-from aobake.meshes.formats.gltf.stores import Place
 from aobake.settings import StoreSettings
 
-__all__ = ["warnings_of"]
+__all__ = ["instanced", "materials_touched", "warnings_of"]
 
 POINTER = "KHR_animation_pointer"
 UNLIT = "KHR_materials_unlit"
 
 
 def warnings_of(
-    source: GltfSource, store: StoreSettings, places: dict[tuple[int, int], Place]
+    source: GltfSource, store: StoreSettings, places: Mapping[Key, Place]
 ) -> tuple[str, ...]:
     """One line for each: what is replaced, shared, or will not be seen."""
-    found = _instanced(source)
+    found = instanced(source, "occlusion, their mean")
     if store.store == "color":
         found += _baked_before(source, places)
     if store.store == "occlusion":
-        found += _materials(source, places)
+        found += materials_touched(source, places)
     return tuple(found)
 
 
-def _instanced(source: GltfSource) -> list[str]:
+def instanced(source: GltfSource, what: str) -> list[str]:
+    """One line for each node whose instances cannot differ in what they get."""
     nodes = dict.fromkeys(binding.node for binding in source.bindings if binding.gpu is not None)
     return [
         f"{source.path.name}: {source.document.label('nodes', node)} places its mesh with {INSTANCING}; "
-        "all of these instances share one occlusion, their mean"
+        f"all of these instances share one {what}"
         for node in nodes
     ]
 
 
-def _baked_before(source: GltfSource, places: dict[tuple[int, int], Place]) -> list[str]:
+def _baked_before(source: GltfSource, places: Mapping[Key, Place]) -> list[str]:
     """Colours that an earlier bake has multiplied: what they were without it cannot be told."""
     count = 0
     for place in places.values():
@@ -51,15 +57,15 @@ def _baked_before(source: GltfSource, places: dict[tuple[int, int], Place]) -> l
     ]
 
 
-def _materials(source: GltfSource, places: dict[tuple[int, int], Place]) -> list[str]:
+def materials_touched(source: GltfSource, places: Mapping[Key, Place]) -> list[str]:
+    """One line for each occlusion texture that is replaced, or that will not be seen."""
     document, name = source.document, source.path.name
-    ours = _ours(places)
-    used = {place.primitive.maybe_integer("material") for place in places.values()}
+    used = {material for place in places.values() for material in materials_of(place.primitive)}
     found: list[str] = []
     for number in sorted(material for material in used if material is not None):
         material = document.entry("materials", number)
         label = document.label("materials", number)
-        if "occlusionTexture" in material and number not in ours:
+        if "occlusionTexture" in material and not _is_ours(document, material):
             found.append(f"{name}: {label} has an occlusion texture, which is replaced")
         if material.extension(UNLIT):
             found.append(f"{name}: {label} is unlit, so viewers ignore its occlusion texture")
@@ -72,13 +78,11 @@ def _materials(source: GltfSource, places: dict[tuple[int, int], Place]) -> list
     return found
 
 
-def _ours(places: dict[tuple[int, int], Place]) -> set[int]:
-    """Materials that every primitive reads through the set of an earlier bake."""
-    found: dict[int, bool] = {}
-    for place in places.values():
-        material = place.primitive.maybe_integer("material")
-        if material is not None:
-            set_ = f"TEXCOORD_{free_set(place)}"
-            again = set_ in place.primitive.needed("attributes")
-            found[material] = found.get(material, True) and again
-    return {material for material, again in found.items() if again}
+def _is_ours(document: Document, material: Element) -> bool:
+    """Whether an earlier bake has made the occlusion texture of a material."""
+    try:
+        texture = document.entry("textures", material.needed("occlusionTexture").integer("index"))
+        image = texture.maybe_integer("source")
+        return image is not None and document.entry("images", image).name == NAME
+    except InputError:  # it points at nothing, and goes
+        return False

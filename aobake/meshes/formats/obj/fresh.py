@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from aobake.meshes.formats.merged import Merged, Part
+from aobake.meshes.formats.merged import Merged
+from aobake.meshes.formats.obj.names import word
 
 __all__ = ["document"]
 
@@ -15,18 +16,12 @@ def document(mesh: Merged) -> bytes:
     lines = ["# aobake: ambient occlusion as vertex colors (v x y z r g b)"]
     vertex = face = 0
     for number, part in enumerate(mesh.parts):
-        lines.append(f"o {_name(part, number)}")
+        lines.append(f"o {word(part.name) or f'part_{number}'}")
         lines += _vertices(mesh, vertex, vertex + part.vertices)
         lines += _faces(mesh, face, face + part.faces)
         vertex += part.vertices
         face += part.faces
     return ("\n".join(lines) + "\n").encode()
-
-
-def _name(part: Part, number: int) -> str:
-    """The instance's name as one word: readers cut names at white space, and a # begins a comment."""
-    name = "_".join(part.name.replace("#", "_").replace("\\", "_").split())
-    return "".join(letter for letter in name if letter.isprintable()) or f"part_{number}"
 
 
 def _vertices(mesh: Merged, begin: int, end: int) -> list[str]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 from aobake.errors import InputError
 from aobake.files import read_bytes
 
-__all__ = ["side_files"]
+__all__ = ["Beside", "Statement", "side_files", "texture_bytes"]
 
 MOST_LIBRARY_BYTES = 1 << 26  # a material library is a few kilobytes of text
 TEXTURES = ("map_", "bump", "disp", "decal", "refl", "norm")
@@ -16,16 +17,37 @@ TEXTURES = ("map_", "bump", "disp", "decal", "refl", "norm")
 OPTION_WORDS = {b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}
 
 
-def side_files(
-    path: Path, libraries: Iterable[bytes], root: Path | None
-) -> tuple[tuple[Path, ...], tuple[str, ...]]:
-    """The files that exist beside an OBJ file and belong to it, and what was passed over, one line each.
+@dataclass(frozen=True)
+class Statement:
+    """A line of a material library: its keyword in lower case, options as (name, words), the rest as text."""
+
+    keyword: str
+    options: tuple[tuple[bytes, tuple[bytes, ...]], ...]
+    rest: str
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What belongs to an OBJ file and lies beside it.
+
+    files : those that exist;  statements : of all material libraries, in order
+    warnings : what was passed over, one line each
+    """
+
+    files: tuple[Path, ...]
+    statements: tuple[Statement, ...]
+    warnings: tuple[str, ...]
+
+
+def side_files(path: Path, libraries: Iterable[bytes], root: Path | None) -> Beside:
+    """The material libraries of an OBJ file, and the textures that they name.
 
     libraries : the texts of its mtllib statements
     root : the folder that they may lie in, with its subfolders; None: the file's own folder
     A file that is missing is passed over in silence, as every viewer does; one outside is warned of.
     """
     found: dict[Path, None] = {}
+    statements: list[Statement] = []
     warnings: dict[str, None] = {}
     for text in libraries:
         for name in _library_names(path.parent, text):
@@ -33,11 +55,25 @@ def side_files(
             if library is None or library in found:
                 continue
             found[library] = None
-            for texture in _texture_names(path, library, warnings):
-                image = _within(path, texture, root, warnings)
+            read = _statements(path, library, warnings)
+            statements += read
+            for statement in read:
+                if not statement.keyword.startswith(TEXTURES) or not statement.rest:
+                    continue
+                image = _within(path, statement.rest, root, warnings)
                 if image is not None:
                     found[image] = None
-    return tuple(found), tuple(warnings)
+    return Beside(tuple(found), tuple(statements), tuple(warnings))
+
+
+def texture_bytes(path: Path, name: str, root: Path | None) -> bytes:
+    """The bytes of a texture that a material library names. Raises InputError."""
+    warnings: dict[str, None] = {}
+    image = _within(path, name, root, warnings)
+    if image is None:
+        finding = next(iter(warnings), f"{name}: there is no such file.")
+        raise InputError(f"{path}: texture {finding} Put it beside the asset.")
+    return read_bytes(image, str(path))
 
 
 def _library_names(folder: Path, text: bytes) -> list[str]:
@@ -51,7 +87,7 @@ def _library_names(folder: Path, text: bytes) -> list[str]:
     return whole.split()
 
 
-def _texture_names(path: Path, library: Path, warnings: dict[str, None]) -> list[str]:
+def _statements(path: Path, library: Path, warnings: dict[str, None]) -> list[Statement]:
     try:
         if library.stat().st_size > MOST_LIBRARY_BYTES:
             warnings[
@@ -64,25 +100,34 @@ def _texture_names(path: Path, library: Path, warnings: dict[str, None]) -> list
             f"{library.name}: the material library cannot be read; its textures are not copied."
         ] = None
         return []
-    names = []
-    for line in lines:
-        keyword, _, rest = line.strip().partition(b" ")
-        if keyword.decode("ascii", "replace").lower().startswith(TEXTURES) and rest.strip():
-            names.append(_without_options(rest.strip()))
-    return names
+    return [_statement(line) for line in lines if line.strip()]
 
 
-def _without_options(rest: bytes) -> str:
-    """The file name of a texture statement, spaces kept: what follows the options."""
+def _statement(line: bytes) -> Statement:
+    keyword, _, rest = line.strip().replace(b"\t", b" ").partition(b" ")
+    name = keyword.decode("ascii", "replace").lower()
+    rest = rest.strip()
+    if not name.startswith(TEXTURES):
+        return Statement(name, (), _decoded(rest))
+    options = []
     while rest.startswith(b"-"):
         option, _, rest = rest.partition(b" ")
-        for _ in range(OPTION_WORDS.get(option, 1)):
-            word, _, after = rest.lstrip().partition(b" ")
-            if OPTION_WORDS.get(option) == 3 and not _is_number(word):
-                break
-            rest = after
+        words, rest = _option_words(option, rest)
+        options.append((option, words))
         rest = rest.lstrip()
-    return _decoded(rest)
+    return Statement(name, tuple(options), _decoded(rest))
+
+
+def _option_words(option: bytes, rest: bytes) -> tuple[tuple[bytes, ...], bytes]:
+    """The words that belong to an option of a texture statement, and what follows them, spaces kept."""
+    words: list[bytes] = []
+    for _ in range(OPTION_WORDS.get(option, 1)):
+        word, _, after = rest.lstrip().partition(b" ")
+        if OPTION_WORDS.get(option) == 3 and not _is_number(word):
+            break
+        words.append(word)
+        rest = after
+    return tuple(words), rest
 
 
 def _is_number(word: bytes) -> bool:

@@ -9,11 +9,13 @@ import numpy as np
 
 from aobake.errors import InputError
 from aobake.files import read_bytes
+from aobake.meshes.formats.obj.attributes import attributes_of
 from aobake.meshes.formats.obj.geometry import Geometry, parse
+from aobake.meshes.formats.obj.looks import looks_of
 from aobake.meshes.formats.obj.materials import side_files
 from aobake.meshes.formats.obj.source import ObjSource
-from aobake.meshes.formats.polygons import triangulate
-from aobake.meshes.scene import FloatArray, Mesh, Scene
+from aobake.meshes.formats.polygons import triangle_corners
+from aobake.meshes.scene import FloatArray, Instance, Mesh, Scene
 
 __all__ = ["read"]
 
@@ -34,20 +36,35 @@ def read(path: Path, *, root: Path | None, scene: str | None) -> Scene:
         )
     text = read_bytes(path)
     geometry = parse(text, str(path))
-    faces = triangulate(geometry.positions, geometry.corners, geometry.sizes)
+    triangles = triangle_corners(geometry.positions, geometry.corners, geometry.sizes)
     normals = _vertex_normals(geometry)
-    mesh = Mesh(vertices=geometry.positions, faces=faces, normals=normals, name=path.stem)
-    beside, passed_over = side_files(path, geometry.names.get(b"mtllib", ()), root)
-    warnings = [*_warnings(geometry), *passed_over]
+    beside = side_files(path, geometry.names.get(b"mtllib", ()), root)
+    looks = looks_of(path, root, beside.statements, geometry)
+    mesh = Mesh(
+        vertices=geometry.positions,
+        faces=geometry.corners.astype(np.int32)[triangles],
+        normals=normals,
+        name=path.stem,
+        material=looks.only,
+        attributes=attributes_of(text, str(path), geometry, triangles),
+    )
+    warnings = [*_warnings(geometry), *beside.warnings]
     source = ObjSource(
         path=path,
-        files=(path, *beside),
+        files=(path, *beside.files),
         text=text,
-        found=_facts(text, geometry, len(faces), normals is not None, warnings),
+        found=_facts(text, geometry, len(triangles), normals is not None, warnings),
         rational=bool(geometry.values[4]) and any(geometry.others[word] for word in FREE_FORM),
         five_numbers=geometry.values[5],
     )
-    return Scene.from_meshes([mesh], source=source, warnings=warnings)
+    return Scene(
+        meshes=(mesh,),
+        instances=(Instance(mesh=0, name=mesh.name),),
+        materials=looks.materials,
+        images=looks.images,
+        source=source,
+        warnings=tuple(warnings),
+    )
 
 
 def _vertex_normals(geometry: Geometry) -> FloatArray | None:

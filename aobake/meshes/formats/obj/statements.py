@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from aobake.errors import InputError
 from aobake.meshes.formats.tokens import NEWLINE, SPACE, IndexArray, line_number, word_spans
 
-__all__ = ["Block", "arguments", "blocks"]
+__all__ = ["UTF8_MARK", "Block", "arguments", "blocks"]
 
 BLOCK_BYTES = (
     1 << 24
@@ -46,7 +46,7 @@ class Block:
     line_ends: IndexArray
 
     def keyword(self, keyword: bytes) -> NDArray[np.bool_]:
-        """(S,) whether a statement begins with this word, of one or two letters."""
+        """(S,) whether a statement begins with this word."""
         begin = self.starts[self.first]
         found: NDArray[np.bool_] = self.ends[self.first] - begin == len(keyword)
         for place, letter in enumerate(keyword):

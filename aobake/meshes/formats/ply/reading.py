@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from aobake.errors import InputError
 from aobake.files import read_bytes
+from aobake.meshes.formats.ply.attributes import Corners, attributes_of
 from aobake.meshes.formats.ply.body import Body, open_body
 from aobake.meshes.formats.ply.header import Element, Header, Property, parse_header
 from aobake.meshes.formats.ply.layout import Layout, layouts, list_values, scalar_values
 from aobake.meshes.formats.ply.source import PlySource
-from aobake.meshes.formats.polygons import strip_triangles, triangulate
+from aobake.meshes.formats.polygons import strip_triangles, triangle_corners
 from aobake.meshes.formats.tokens import IndexArray
 from aobake.meshes.scene import FloatArray, IntArray, Mesh, Scene
 
@@ -45,12 +47,17 @@ def read(path: Path, *, root: Path | None, scene: str | None) -> Scene:  # noqa:
         raise InputError(
             f"{where}: it has no element vertex with the properties x, y and z. {CURE}"
         )
-    faces, polygons, warnings = _faces(body, rows, vertices, where)
-    normals = _triple(body, rows.get("vertex"), ("nx", "ny", "nz"))
-    mesh = Mesh(vertices=vertices, faces=faces, normals=normals, name=path.stem)
-    found = _facts(header, polygons, len(faces), warnings)
+    faces = _faces(body, rows, vertices, where)
+    mesh = Mesh(
+        vertices=vertices,
+        faces=faces.triangles,
+        normals=_triple(body, rows.get("vertex"), ("nx", "ny", "nz")),
+        name=path.stem,
+        attributes=attributes_of(data, header, where, faces.corners),
+    )
+    found = _facts(header, faces)
     source = PlySource(path=path, data=data, header=header, found=found)
-    return Scene.from_meshes([mesh], source=source, warnings=warnings)
+    return Scene.from_meshes([mesh], source=source, warnings=faces.warnings)
 
 
 def _refuse_doubled(header: Header, where: str) -> None:
@@ -76,21 +83,33 @@ def _triple(body: Body, vertices: Layout | None, names: tuple[str, ...] | str) -
     return triple
 
 
-def _faces(
-    body: Body, rows: Mapping[str, Layout], vertices: FloatArray, where: str
-) -> tuple[IntArray, int, list[str]]:
-    """Triangles of all faces and strips, how many faces there are, and what was passed over."""
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """Triangles of all faces and strips, how many faces there are, and what was passed over.
+
+    corners : which corners of faces the triangles have; None where some are of strips
+    """
+
+    triangles: IntArray
+    polygons: int
+    warnings: tuple[str, ...]
+    corners: Corners | None
+
+
+def _faces(body: Body, rows: Mapping[str, Layout], vertices: FloatArray, where: str) -> _Faces:
     found, warnings = [np.zeros((0, 3), np.int32)], []
-    polygons = 0
+    polygons = Corners(np.zeros(0, np.int64), found[0])
     if (layout := rows.get("face")) is not None and layout.element.count:
         corners, sizes = _indices(body, layout, len(vertices), 0, where)
-        found.append(triangulate(vertices, corners, sizes))
-        polygons = len(sizes)
+        polygons = Corners(sizes, triangle_corners(vertices, corners, sizes))
+        found.append(corners.astype(np.int32)[polygons.triangles])
         if small := int((sizes < 3).sum()):
             warnings.append(f"{small} faces have fewer than three corners and are passed over.")
     if (layout := rows.get("tristrips")) is not None and layout.element.count:
         found.append(strip_triangles(*_indices(body, layout, len(vertices), -1, where)))
-    return np.concatenate(found), polygons, warnings
+    triangles = np.concatenate(found)
+    of_faces = len(triangles) == len(polygons.triangles)
+    return _Faces(triangles, len(polygons.sizes), tuple(warnings), polygons if of_faces else None)
 
 
 def _indices(
@@ -126,15 +145,13 @@ def _index_list(element: Element) -> Property | None:
     return None
 
 
-def _facts(
-    header: Header, polygons: int, triangles: int, warnings: list[str]
-) -> Mapping[str, object]:
+def _facts(header: Header, faces: _Faces) -> Mapping[str, object]:
     vertex = header.element("vertex")
     names = [prop.name for prop in vertex.properties] if vertex else []
     return {
         "vertices": vertex.count if vertex else 0,
-        "faces": polygons,
-        "triangles": triangles,
+        "faces": faces.polygons,
+        "triangles": len(faces.triangles),
         "normals": "of every vertex" if {"nx", "ny", "nz"} <= set(names) else "none",
         "vertex colors": "red, green, blue" if {"red", "green", "blue"} <= set(names) else "none",
         "elements": {element.name: element.count for element in header.elements},
@@ -144,5 +161,5 @@ def _facts(
         "encoding": header.encoding,
         "comments": list(header.comments),
         "a bake touches": "the vertex properties red, green, blue and ao",
-        "problems": list(warnings),
+        "problems": list(faces.warnings),
     }

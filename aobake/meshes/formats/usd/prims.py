@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from aobake.meshes.formats.usd.source import Binding
 from aobake.meshes.scene import FloatArray
 
-__all__ = ["Colors", "IndexArray", "MeshPrim", "Opened", "Primvar", "turned", "without_holes"]
+__all__ = [
+    "Colors",
+    "IndexArray",
+    "MeshPrim",
+    "Opened",
+    "Primvar",
+    "Values",
+    "turned",
+    "without_holes",
+]
 
 IndexArray: TypeAlias = NDArray[np.int64]
 
@@ -24,6 +33,8 @@ class MeshPrim:
 
     points : (V, 3) float64     sizes : (F,) corners of each face     corners : (sum of sizes,) points of all
     normals : (N, 3) as authored, or None; by_corner : whether they belong to corners, not to points
+    authored : (sum of sizes,) which corner on the stage each is;  solid : (F,) which face each is
+    texture, colors, ao : primvars, where there are some that fit
     transforms : (4, 4) each, for column vectors: where it stands; several under a point instancer
     """
 
@@ -37,6 +48,19 @@ class MeshPrim:
     subdivided: bool
     double_sided: bool
     transforms: tuple[FloatArray, ...]
+    authored: IndexArray
+    solid: IndexArray
+    texture: Values | None
+    colors: Values | None
+    ao: Values | None
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """A primvar of a mesh. values : (N, k) float64, as many as the interpolation asks for"""
+
+    values: FloatArray
+    interpolation: str
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -81,10 +105,9 @@ def turned(sizes: IndexArray, corners: IndexArray) -> IndexArray:
 
 
 def without_holes(
-    sizes: IndexArray, corners: IndexArray, holes: IndexArray
-) -> tuple[IndexArray, IndexArray, NDArray[np.bool_]]:
-    """Faces that are not holes, and which corners are theirs."""
+    sizes: IndexArray, holes: IndexArray
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(F,) which faces are no holes, and (sum of sizes,) which corners are theirs."""
     solid = np.ones(len(sizes), np.bool_)
     solid[holes[(holes >= 0) & (holes < len(sizes))]] = False
-    kept = np.repeat(solid, sizes)
-    return sizes[solid], corners[kept], kept
+    return solid, np.repeat(solid, sizes)

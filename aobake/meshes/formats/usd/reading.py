@@ -7,6 +7,7 @@ the points are.
 from __future__ import annotations
 
 import importlib.util
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,9 +16,17 @@ import numpy as np
 
 from aobake.errors import InputError
 from aobake.files import read_bytes
-from aobake.meshes.formats.polygons import triangulate
+from aobake.meshes.formats.polygons import triangle_corners
 from aobake.meshes.formats.usd.source import Binding, UsdSource
-from aobake.meshes.scene import FloatArray, Instance, Material, Mesh, Scene
+from aobake.meshes.scene import (
+    Attribute,
+    FloatArray,
+    Instance,
+    IntArray,
+    Material,
+    Mesh,
+    Scene,
+)
 
 if TYPE_CHECKING:
     from aobake.meshes.formats.usd.prims import MeshPrim, Opened
@@ -46,12 +55,7 @@ def read(path: Path, *, root: Path | None, scene: str | None) -> Scene:
 
     stage = opened(path)
     _refuse_outside(path, root, stage.layers)
-    bindings: list[Binding] = []
-    instances: list[Instance] = []
-    for number, prim in enumerate(stage.prims):
-        for transform in prim.transforms:
-            bindings.append(prim.binding)
-            instances.append(Instance(mesh=number, transform=transform, name=prim.name))
+    bindings, instances = _placed(stage)
     said = tuple(f"{path.name}: {text}" for text in stage.said)
     return Scene(
         meshes=tuple(_mesh(prim) for prim in stage.prims),
@@ -68,13 +72,61 @@ def read(path: Path, *, root: Path | None, scene: str | None) -> Scene:
     )
 
 
+def _placed(stage: Opened) -> tuple[list[Binding], list[Instance]]:
+    bindings: list[Binding] = []
+    instances: list[Instance] = []
+    users = Counter(prim.binding for prim in stage.prims for _ in prim.transforms)
+    first: dict[Binding, int] = {}
+    for number, prim in enumerate(stage.prims):
+        for transform in prim.transforms:
+            shared = first.setdefault(prim.binding, len(instances))
+            bindings.append(prim.binding)
+            instances.append(
+                Instance(
+                    mesh=number,
+                    transform=transform,
+                    name=prim.name,
+                    stored_with=shared if users[prim.binding] > 1 else None,
+                )
+            )
+    return bindings, instances
+
+
 def _mesh(prim: MeshPrim) -> Mesh:
+    triangles = triangle_corners(prim.points, prim.corners, prim.sizes)
     return Mesh(
         vertices=prim.points,
-        faces=triangulate(prim.points, prim.corners, prim.sizes),
+        faces=prim.corners.astype(np.int32)[triangles],
         normals=_normals(prim),
         name=prim.name,
         material=int(prim.double_sided),
+        attributes=_attributes(prim, triangles),
+    )
+
+
+def _attributes(prim: MeshPrim, triangles: IntArray) -> dict[str, Attribute]:
+    """TEXCOORD_0, COLOR_0 and _AO of a mesh, where it has them."""
+    found = {}
+    if prim.texture is not None:  # its v runs up
+        downwards = prim.texture.values * (1.0, -1.0) + (0.0, 1.0)
+        found["TEXCOORD_0"] = _attribute(prim, triangles, prim.texture.interpolation, downwards)
+    for name, primvar in (("COLOR_0", prim.colors), ("_AO", prim.ao)):
+        if primvar is not None:
+            found[name] = _attribute(prim, triangles, primvar.interpolation, primvar.values)
+    return found
+
+
+def _attribute(
+    prim: MeshPrim, triangles: IntArray, interpolation: str, values: FloatArray
+) -> Attribute:
+    if interpolation in {"vertex", "varying"}:
+        return Attribute(values=values)
+    if interpolation == "faceVarying":
+        return Attribute(values=values, corners=prim.authored.astype(np.int32)[triangles])
+    of_face = np.zeros(len(prim.sizes), np.int64) if interpolation == "constant" else prim.solid
+    of_triangle = np.repeat(of_face, np.maximum(prim.sizes - 2, 0))
+    return Attribute(
+        values=values, corners=np.repeat(of_triangle[:, None], 3, axis=1).astype(np.int32)
     )
 
 

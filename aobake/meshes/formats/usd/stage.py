@@ -24,6 +24,7 @@ from aobake.meshes.formats.usd.prims import (
     MeshPrim,
     Opened,
     Primvar,
+    Values,
     turned,
     without_holes,
 )
@@ -203,24 +204,29 @@ class _Walk:
         corners = _array(mesh.GetFaceVertexIndicesAttr().Get(time), np.int64)
         self._check(prim, len(points), sizes, corners)
         normals, by_corner = self._normals(mesh, len(points), len(corners))
-        sizes, corners, kept = without_holes(
-            sizes, corners, _array(mesh.GetHoleIndicesAttr().Get(time), np.int64)
-        )
+        primvars = _Primvars(mesh, time, len(points), sizes)
+        solid, kept = without_holes(sizes, _array(mesh.GetHoleIndicesAttr().Get(time), np.int64))
+        sizes, authored = sizes[solid], np.flatnonzero(kept)
         normals = normals[kept] if normals is not None and by_corner else normals
+        if mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded:
+            authored = turned(sizes, authored)
         self.found.append(
             MeshPrim(
                 binding=Binding(str(prim.GetPath()), instances),
                 name=str(prim.GetName()),
                 points=points,
                 sizes=sizes,
-                corners=turned(sizes, corners)
-                if mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded
-                else corners,
+                corners=corners[authored],
                 normals=normals,
                 by_corner=by_corner,
                 subdivided=mesh.GetSubdivisionSchemeAttr().Get(time) != UsdGeom.Tokens.none,
                 double_sided=bool(mesh.GetDoubleSidedAttr().Get(time)),
                 transforms=transforms,
+                authored=authored,
+                solid=np.flatnonzero(solid),
+                texture=primvars.texture(),
+                colors=primvars.named("displayColor", 3),
+                ao=primvars.named("ao", 1),
             )
         )
 
@@ -294,6 +300,51 @@ class _Walk:
                 own, _ = self.cache.ComputeRelativeTransform(prim, root.GetParent())
                 self._mesh(prim, below, tuple(_columns(own * place) for place in at))
             waiting += [(c, below) for c in prim.GetFilteredChildren(self.children)]
+
+
+class _Primvars:
+    """What a mesh has beside points and normals, as far as there are as many values as are needed."""
+
+    def __init__(
+        self, mesh: UsdGeom.Mesh, time: Usd.TimeCode, points: int, sizes: IndexArray
+    ) -> None:
+        self.found = UsdGeom.PrimvarsAPI(mesh)
+        self.time = time
+        tokens = UsdGeom.Tokens
+        self.needed = {
+            tokens.constant: 1,
+            tokens.uniform: len(sizes),
+            tokens.vertex: points,
+            tokens.varying: points,
+            tokens.faceVarying: int(sizes.sum()),
+        }
+
+    def texture(self) -> Values | None:
+        """`st`, by custom; else the first primvar by name that is a texture coordinate."""
+        others = [
+            primvar.GetPrimvarName()
+            for primvar in self.found.GetPrimvarsWithValues()
+            if primvar.GetTypeName().role == "TextureCoordinate"
+        ]
+        return next(
+            (found for name in ("st", *sorted(others)) if (found := self.named(name, 2))), None
+        )
+
+    def named(self, name: str, width: int) -> Values | None:
+        """The values of a primvar, which have this many numbers each; an inherited one counts as well."""
+        primvar = self.found.FindPrimvarWithInheritance(name)
+        if not primvar or not primvar.HasValue():
+            return None
+        interpolation = primvar.GetInterpolation()
+        flat = primvar.ComputeFlattened(self.time)
+        try:
+            values = _array(flat, np.float64)
+        except (TypeError, ValueError):  # a primvar of this name may be text
+            return None
+        values = values[:, None] if values.ndim == width == 1 else values
+        if values.shape != (self.needed.get(interpolation), width):
+            return None
+        return Values(values, str(interpolation))
 
 
 def _colors(prim: Usd.Prim) -> Colors | None:
