@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aobake.errors import InputError
 from aobake.meshes.normals import unit_rows
+from aobake.meshes.scene import Instance, Scene
+from aobake.meshes.surface import Surface
+from aobake.prepare import Prepared, turned_normals
+from aobake.tracing.compiled import read_only
+from aobake.tracing.interpolation import interpolate
 
-__all__ = ["SurfacePoints", "given_points"]
+__all__ = ["SurfacePoints", "asked_vertices", "given_points", "points_on_faces", "vertex_points"]
 
 FloatArray = NDArray[np.float64]
+
+# Detail that float32 resolves on an instance: its transform errs by 8 half-ulps.
+INSTANCED = 1.0 / 8.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -24,6 +32,7 @@ class SurfacePoints:
     geometric : (P, 3) float64, unit length: directions below the surface itself do not count; or None
     detail : (P,) float64, the size of what is to be told apart around each point; infinite: anything
     numbers : (P,) int64, the index that makes a point's directions its own
+    owners : (P,) int32, the instance that each point is on; -1: none
     """
 
     positions: FloatArray
@@ -31,6 +40,7 @@ class SurfacePoints:
     geometric: FloatArray | None
     detail: FloatArray
     numbers: NDArray[np.int64]
+    owners: NDArray[np.int32]
 
     def only(self, chosen: NDArray[np.int64]) -> SurfacePoints:
         """Some of the points, by their place in these arrays."""
@@ -40,6 +50,7 @@ class SurfacePoints:
             geometric=None if self.geometric is None else self.geometric[chosen],
             detail=self.detail[chosen],
             numbers=self.numbers[chosen],
+            owners=self.owners[chosen],
         )
 
     def __len__(self) -> int:
@@ -69,8 +80,97 @@ def given_points(
         geometric=None if above is None else above[chosen],
         detail=np.full(len(chosen), np.inf),
         numbers=chosen,
+        owners=np.full(len(chosen), -1, np.int32),
     )
     return points, len(at)
+
+
+def vertex_points(scene: Scene, prepared: Prepared) -> SurfacePoints:
+    """The vertices to trace from, instance by instance; numbered as they stand in the whole scene."""
+    asked = [
+        np.zeros(0, np.int64) if stands is None else np.flatnonzero(asked_vertices(*stands))
+        for stands in prepared.placed
+    ]
+    ends = np.cumsum([len(chosen) for chosen in asked], dtype=np.int64)
+    points = _room_for(int(ends[-1]) if len(ends) else 0)
+    stretches = stretch_of_instances(scene)
+    first = 0
+    for number, (instance, mesh) in enumerate(scene.placed()):
+        stands, chosen = prepared.placed[number], asked[number]
+        if stands is not None:
+            linear, shift = instance.transform[:3, :3], instance.transform[:3, 3]
+            rows = slice(ends[number] - len(chosen), ends[number])
+            points.positions[rows] = mesh.vertices[chosen] @ linear.T + shift
+            points.normals[rows] = turned_normals(stands[1].normals[chosen], linear)
+            points.detail[rows] = stretches[number] * stands[1].detail[chosen]
+            points.numbers[rows] = chosen + first
+            points.owners[rows] = number
+        first += len(mesh.vertices)
+    return points
+
+
+def _room_for(count: int) -> SurfacePoints:
+    return SurfacePoints(
+        positions=np.empty((count, 3)),
+        normals=np.empty((count, 3)),
+        geometric=None,
+        detail=np.empty(count),
+        numbers=np.empty(count, np.int64),
+        owners=np.empty(count, np.int32),
+    )
+
+
+def asked_vertices(instance: Instance, surface: Surface) -> NDArray[np.bool_]:
+    """(V,) the vertices to trace from; none where the transform leaves their normals no direction."""
+    turned = turned_normals(surface.normals, instance.transform[:3, :3])
+    return surface.asked & turned.any(axis=1)
+
+
+def points_on_faces(
+    scene: Scene,
+    prepared: Prepared,
+    instances: NDArray[np.int32],
+    faces: NDArray[np.int32],
+    weights: FloatArray,
+    numbers: NDArray[np.int64],
+) -> SurfacePoints:
+    """Points on the faces of instances, with interpolated normals.
+
+    instances, faces : (P,) int32, an instance that stands somewhere, and a face of its mesh with an area
+    weights : (P, 2) float64, of the second and the third corner of the face
+    numbers : (P,) int64, the index that makes a point's directions its own
+    """
+    points = _room_for(len(instances))
+    points = replace(
+        points, geometric=np.empty((len(instances), 3)), numbers=numbers, owners=instances
+    )
+    spaces = prepared.spaces
+    stretches = stretch_of_instances(scene)
+    meshes = np.array([instance.mesh for instance in scene.instances], np.int32)[instances]
+    order = np.argsort(meshes, kind="stable")
+    ends = np.searchsorted(meshes[order], np.arange(len(scene.meshes) + 1))
+    for number in np.unique(meshes).tolist():
+        mesh, surface = scene.meshes[number], prepared.surfaces[number]
+        interpolate(
+            (mesh.faces, mesh.vertices, read_only(surface.normals), read_only(surface.detail)),
+            (spaces.linear, spaces.turning, spaces.shift, stretches),
+            order[ends[number] : ends[number + 1]],
+            instances,
+            faces,
+            weights,
+            (points.positions, points.normals, points.geometric, points.detail),
+        )
+    return points
+
+
+def stretch_of_instances(scene: Scene) -> FloatArray:
+    """(I,) what the detail of a mesh is multiplied by where each instance stands."""
+    mesh = np.array([instance.mesh for instance in scene.instances], np.int64)
+    uses = np.bincount(mesh, minlength=len(scene.meshes))
+    linear = np.array([instance.transform[:3, :3] for instance in scene.instances])
+    with np.errstate(invalid="ignore"):  # of an instance that stands nowhere
+        reach = np.abs(linear.reshape(-1, 3, 3)).sum(axis=2).max(axis=1)
+    return np.asarray(np.where(uses[mesh] > 1, INSTANCED, 1.0) * reach, np.float64)
 
 
 def _rows(name: str, values: ArrayLike) -> FloatArray:

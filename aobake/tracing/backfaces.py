@@ -10,6 +10,7 @@ from numba import types
 
 from aobake.tracing.compiled import callback
 from aobake.tracing.contacts import pointer_to
+from aobake.tracing.embree import HitFilter
 
 __all__ = ["pass_through_backfaces"]
 
@@ -30,6 +31,6 @@ def _reject(arguments):
 
 
 @functools.cache
-def pass_through_backfaces() -> int:
-    """Address of the filter function, compiled when it is first needed."""
-    return callback(types.void(types.voidptr), _reject)
+def pass_through_backfaces() -> HitFilter:
+    """What lets rays through from behind; compiled when it is first needed."""
+    return HitFilter(function=callback(types.void(types.voidptr), _reject), sided=True)

@@ -38,15 +38,15 @@ RESOLVING_ULPS = (
 MOST_REGIONS = 64  # frames besides the first; each costs a tree
 MOST_SAMPLED = 1 << 16  # vertices of one part that the middle is taken from
 FINEST = 8192.0  # an edge may be this many times as long as the detail beside it: AO errs by 1e-4
-NEAR = (
-    3.0  # or this many times as long as its distance from detail: an equilateral triangle's is 0.29
-)
+NEAR = 8.0  # or this many times as long as its triangle is far from detail: angles err by 2e-6
+LONG = 0.5  # of a triangle's longest edge: what is shorter need not be cut to make it smaller
 COARSER = 8.0  # ratio between the sizes of detail that are told apart
 RESOLVED = (
     2.0**-16
 )  # detail finer than this share of its coordinate is lost in float32 all the same
 SHORTER = 0.9  # of the length that can stay whole, so that what was cut is not cut again
 NEEDLE = 0.2  # shortest against longest edge
+QUARTERS = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4.0  # 15 points
 ROUNDS = 64  # halvings; 2^64 is more than float64 can tell apart
 SPARE_FACES = 200_000  # what splitting may add to twice the faces that were there
 
@@ -158,8 +158,8 @@ def split_long_edges(
 
     The test of a ray against a triangle errs by a few ulps of the triangle's size, so a ground of
     10,000 units blurs what stands on it by a thousandth. An edge is cut while it is longer than
-    FINEST times the size of the detail next to it and NEAR times its distance from there. Both
-    triangles of an edge cut it at the same point, so that no crack opens.
+    FINEST times the size of the detail beside a triangle of it and NEAR times that triangle's distance
+    from there. Both triangles of an edge cut it at the same point, so that no crack opens.
 
     vertices, faces : (V, 3) float64, (F, 3) uint32
     details, sizes : arrays (D, 3) and (D,) float64: points that will be asked for, and the size of the
@@ -186,7 +186,7 @@ def split_long_edges(
     most = 2 * len(faces) + min(SPARE_FACES, 64 * len(faces) + 4096)
     for _ in range(ROUNDS):
         edges, of_face = _unique_edges(active)
-        where = _cuts(vertices[edges[:, 0]], vertices[edges[:, 1]], levels)
+        where = _cuts(vertices, active, edges, of_face, levels)
         if not where.any() or len(active) + sum(map(len, settled)) > most:
             break
         _cut_needles_evenly(vertices, edges, of_face, where)
@@ -240,27 +240,54 @@ def _levels_of_detail(
     return levels
 
 
-def _cuts(a: FloatArray, b: FloatArray, levels: list[tuple[float, cKDTree]]) -> FloatArray:
-    """(E,) where to cut the edges from a to b, as a share of their length; 0: they can stay as they are.
+def _cuts(
+    vertices: FloatArray,
+    faces: FaceArray,
+    edges: NDArray[np.int64],
+    of_face: NDArray[np.int64],
+    levels: list[tuple[float, cKDTree]],
+) -> FloatArray:
+    """(E,) where to cut the edges of some faces, as a share of their length; 0: they can stay as they are.
 
     An edge that is close to detail with one end loses as much there as can stay whole, so that a few
     cuts in growing steps do; any other is halved.
     """
+    a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]
     size_of_edge = np.linalg.norm(b - a, axis=1)
-    where = np.zeros(len(a))
+    longest = size_of_edge[of_face].max(axis=1, initial=0.0)
+    where = np.zeros(len(edges))
     for size, tree in levels:
-        long = np.flatnonzero((where == 0.0) & (size_of_edge > FINEST * size))
-        if len(long) == 0:
+        fine = FINEST * size
+        large = np.flatnonzero(longest > fine)
+        if len(large) == 0:
             continue
-        # Five points along the edge find whatever lies beside it to an eighth of its length.
-        along = np.linspace(0.0, 1.0, 5)[:, None, None]
-        samples = (1.0 - along) * a[long] + along * b[long]
-        distance = tree.query(samples)[0]
-        allowed = FINEST * size + NEAR * distance.min(axis=0)
-        kept = SHORTER * (FINEST * size + NEAR * distance[[0, -1]]) / size_of_edge[long]
-        share = np.where(kept[0] < 0.5, kept[0], np.where(kept[1] < 0.5, 1.0 - kept[1], 0.5))
-        where[long] = np.where(size_of_edge[long] > allowed, share, 0.0)
+        distance = _distances(tree, vertices[faces[large]], longest[large], fine)
+        counts = size_of_edge[of_face[large]] > LONG * longest[large, None]
+        own = np.where(counts, (fine + NEAR * distance)[:, None], np.inf)
+        allowed = np.full(len(edges), np.inf)
+        np.minimum.at(allowed, of_face[large], own)
+        long = np.flatnonzero((where == 0.0) & (size_of_edge > allowed))
+        ends = np.stack([a[long], b[long]])
+        kept = SHORTER * (fine + NEAR * tree.query(ends)[0]) / size_of_edge[long]
+        where[long] = np.where(kept[0] < 0.5, kept[0], np.where(kept[1] < 0.5, 1.0 - kept[1], 0.5))
     return where
+
+
+def _distances(tree: cKDTree, corners: FloatArray, longest: FloatArray, fine: float) -> FloatArray:
+    """(N,) how far triangles (N, 3, 3) are from the nearest point of a tree, at least.
+
+    It is never too much: 15 points of a triangle, on a grid of quarters, leave none of it farther from all
+    of them than a quarter of its longest edge over sqrt(3). Triangles whose middle is far enough away
+    for their size are settled by that alone.
+    """
+    middle = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    distance = np.maximum(tree.query(middle)[0] - reach, 0.0)
+    near = np.flatnonzero(longest > fine + NEAR * distance)
+    samples = np.einsum("sc,nci->nsi", QUARTERS, corners[near])
+    nearest = tree.query(samples)[0].min(axis=1, initial=np.inf)
+    distance[near] = np.maximum(nearest - longest[near] / (4.0 * math.sqrt(3.0)), 0.0)
+    return np.asarray(distance)
 
 
 def _unique_edges(faces: FaceArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

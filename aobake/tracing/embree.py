@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from aobake.errors import EngineError
 
-__all__ = ["Body", "Functions", "Tree", "build_tree", "functions", "version"]
+__all__ = ["Body", "Functions", "HitFilter", "Tree", "build_tree", "functions", "version"]
 
 FORMAT_UINT3, FORMAT_FLOAT3, FORMAT_FLOAT3X4_COLUMN_MAJOR = 0x5003, 0x9003, 0x9234
 BUFFER_INDEX, BUFFER_VERTEX = 0, 1
@@ -57,6 +57,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     ),
     "rtcSetGeometryIntersectFilterFunction": (None, [ctypes.c_void_p, ctypes.c_void_p]),
     "rtcSetGeometryOccludedFilterFunction": (None, [ctypes.c_void_p, ctypes.c_void_p]),
+    "rtcSetGeometryUserData": (None, [ctypes.c_void_p, ctypes.c_void_p]),
     "rtcCommitGeometry": (None, [ctypes.c_void_p]),
     "rtcAttachGeometryByID": (None, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint]),
     "rtcReleaseGeometry": (None, [ctypes.c_void_p]),
@@ -72,18 +73,34 @@ class Functions:
     point_query: int
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HitFilter:
+    """What decides, within the traversal, which hits on some triangles count.
+
+    function : address of an RTCFilterFunctionN
+    sided : whether it tells fronts from backs
+    data : what the function finds at geometryUserPtr, for these triangles and no others; or None
+    kept : what `data` holds the addresses of
+    """
+
+    function: int
+    sided: bool
+    data: NDArray[np.int64] | None = None
+    kept: tuple[object, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Body:
     """Triangles for a tree.
 
     vertices : (V, 3) float32, C-ordered, followed by at least READ_AHEAD_BYTES of readable memory
     faces : (F, 3) uint32, C-ordered
-    hit_filter : address of an RTCFilterFunctionN that decides which hits count; 0: all do
+    hit_filter : decides which hits count; None: all do
     """
 
     vertices: NDArray[np.float32]
     faces: NDArray[np.uint32]
-    hit_filter: int = 0
+    hit_filter: HitFilter | None = None
 
 
 class Tree:
@@ -166,9 +183,11 @@ def _attach_triangles(scene: int, number: int, body: Body) -> None:
         library.rtcSetSharedGeometryBuffer(
             geometry, kind, 0, form, array.ctypes.data, 0, size, len(array)
         )
-    if body.hit_filter:
-        library.rtcSetGeometryOccludedFilterFunction(geometry, body.hit_filter)
-        library.rtcSetGeometryIntersectFilterFunction(geometry, body.hit_filter)
+    if body.hit_filter is not None:
+        library.rtcSetGeometryOccludedFilterFunction(geometry, body.hit_filter.function)
+        library.rtcSetGeometryIntersectFilterFunction(geometry, body.hit_filter.function)
+        if body.hit_filter.data is not None:
+            library.rtcSetGeometryUserData(geometry, body.hit_filter.data.ctypes.data)
     _attach(scene, number, geometry)
 
 

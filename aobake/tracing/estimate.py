@@ -1,56 +1,46 @@
-"""Estimates and their errors: blocks of points over threads, rounds of rays until a tolerance is met.
+"""Estimates and their errors: blocks of points over threads, a fixed number of rays or rounds of them.
 
-The error of a well-spread direction set comes from the rays next to the boundary of the visible region;
-the others hit or miss whichever way the set is turned. Along a Hilbert curve over the hemisphere the
-squared differences D of successive values count those boundary rays, so
-
-    standard error = sqrt(SPREAD D + UNSEEN^2) / n
-
-Measured against 32,768 rays on a bumpy sphere, two characters and a cave, at 16 to 4,096 rays: the
-squared error of n times the mean is 0.3 where all rays agree, then grows by 0.09 for each unit of D up
-to D = 150. For independent samples SPREAD would be 1/2 (J. von
-Neumann et al., The mean square successive difference, Annals of Mathematical Statistics 12, 1941; its
-use for systematic samples: K. Wolter, JASA 79, 1984). UNSEEN stands for what is too small to be met by
-any ray: a point where all rays agree is not exact. The binomial formula sqrt(A (1 - A) / n) would be
-four times too wide at 256 rays.
+The value at a point depends on its number and the seed, not on blocks and threads. With a tolerance the
+sets of directions double in rounds where that is still needed (rounds.py).
 """
 
 from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.settings import BakeSettings
+from aobake.settings import FIRST_ROUND, TraceSettings
 from aobake.tracing import embree
 from aobake.tracing.contacts import note_triangle
 from aobake.tracing.kernels import LINEAR, SMOOTH, trace
 from aobake.tracing.kernels import scratch as kernel_scratch
-from aobake.tracing.origins import ENCLOSED, place_origins
+from aobake.tracing.lobes import lobed
+from aobake.tracing.origins import ENCLOSED, OPEN, PLAIN, place_origins
 from aobake.tracing.origins import scratch as origins_scratch
-from aobake.tracing.sampling import direction_sets
+from aobake.tracing.rounds import Tally, grown
+from aobake.tracing.sampling import added_directions, direction_sets
 from aobake.tracing.world import World
 
-__all__ = ["Estimates", "Request", "compile_kernels", "estimate"]
+__all__ = ["Estimates", "Request", "compile_kernels", "estimate", "processors"]
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 Progress = Callable[[int, int], None]
 
-SPREAD = 0.09
-UNSEEN = 0.55
-FIRST_ROUND = 64  # rays of the first round towards a tolerance
-SMALLEST_ROUND = 16
 BLOCK_RAYS = (
     1 << 18
 )  # about 40 ms of one thread: often enough to stop promptly, seldom enough to cost nothing
 LEAST_BLOCK_RAYS = 1 << 14
 MOST_POINTS = 4096
 POLL_SECONDS = 0.1
+STEP = 1 << 32  # beyond all numbers of rays, for two of them in one number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,6 +48,10 @@ class Request:
     """Points to estimate at. See points.SurfacePoints, whose arrays these are.
 
     ground : height of the ground along its axis, in the scene's space; None: there is none
+    open : (P,) bool, points that everything lies below, which need no ray unless something touches them
+        face to face; None: nothing is known of any
+    sets : directions to trace instead of sampling.direction_sets(rays), as many and in the same form, but
+        2^k sets of any number: for comparing ways to choose them; None: those
     """
 
     positions: FloatArray
@@ -65,68 +59,193 @@ class Request:
     geometric: FloatArray | None
     numbers: NDArray[np.int64]
     ground: float | None = None
+    open: NDArray[np.bool_] | None = None
+    sets: NDArray[np.float32] | None = None
+
+    def only(self, chosen: IntArray) -> Request:
+        """Some of the points, by their place in these arrays."""
+        return replace(
+            self,
+            positions=self.positions[chosen],
+            normals=self.normals[chosen],
+            geometric=None if self.geometric is None else self.geometric[chosen],
+            numbers=self.numbers[chosen],
+            open=None if self.open is None else self.open[chosen],
+        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Estimates:
-    """mean, standard_error : (P,) float32; rays : (P,) int32; states : (P,) uint8 of origins.py."""
+    """mean, standard_error : (P,) float32; rays : (P,) int32; states : (P,) uint8 of origins.py.
+
+    bent : (P, 3) float32, unit length, the mean open direction, the normal where nothing is open; or None
+    """
 
     mean: NDArray[np.float32]
     standard_error: NDArray[np.float32]
     rays: NDArray[np.int32]
     states: NDArray[np.uint8]
+    bent: NDArray[np.float32] | None = None
 
     @classmethod
-    def blank(cls, count: int) -> Estimates:
+    def blank(cls, count: int, *, bent: bool = False) -> Estimates:
         """For `count` points, all open and nothing spent yet."""
         return cls(
             mean=np.ones(count, np.float32),
             standard_error=np.zeros(count, np.float32),
             rays=np.zeros(count, np.int32),
             states=np.zeros(count, np.uint8),
+            bent=np.zeros((count, 3), np.float32) if bent else None,
+        )
+
+    def only(self, chosen: IntArray) -> Estimates:
+        """Some of them, by their place in these arrays."""
+        return Estimates(
+            mean=self.mean[chosen],
+            standard_error=self.standard_error[chosen],
+            rays=self.rays[chosen],
+            states=self.states[chosen],
+            bent=None if self.bent is None else self.bent[chosen],
+        )
+
+    def put(self, chosen: IntArray, part: Estimates) -> None:
+        """Take in estimates of some of the points, by their place in these arrays."""
+        self.mean[chosen], self.standard_error[chosen] = part.mean, part.standard_error
+        self.rays[chosen], self.states[chosen] = part.rays, part.states
+        if self.bent is not None and part.bent is not None:
+            self.bent[chosen] = part.bent
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """What there is to trace, and what has come of it so far.
+
+    origins : (P, 3) float32, in the tree's space
+    open_directions : (P, 3) float64, the sum of the directions of rays, each as much as it is open; or None
+    """
+
+    world: World
+    request: Request
+    settings: TraceSettings
+    origins: NDArray[np.float32]
+    states: NDArray[np.uint8]
+    tally: Tally
+    open_directions: FloatArray | None
+
+    @classmethod
+    def planned(cls, world: World, request: Request, settings: TraceSettings) -> Work:
+        """Nothing done yet."""
+        count = len(request.positions)
+        origins = np.empty((count, 3), np.float32)
+        states = np.zeros(count, np.uint8)
+        return cls(
+            world,
+            request,
+            settings,
+            origins,
+            states,
+            Tally.blank(count, grows=settings.tolerance is not None),
+            np.zeros((count, 3)) if settings.bent_normals else None,
         )
 
 
-def compile_kernels(world: World, request: Request, settings: BakeSettings) -> None:
+def compile_kernels(world: World, request: Request, settings: TraceSettings) -> None:
     """Compile what these settings need, or load it from disk, in the calling thread.
 
     There an interrupt ends it; threads that compile at once would wait for each other.
     """
-    nowhere = slice(0, 0)
-    _block(world, request, settings, nowhere, Estimates.blank(0))
-    no_origins, no_points = np.zeros((0, 3), np.float32), np.zeros(0, np.int64)
-    _trace(world, request, settings, nowhere, no_origins, no_points, rays=1, number=0)
+    nothing = Work.planned(world, request, settings)
+    none = np.zeros(0, np.int64)
+    _place(nothing, none)
+    _trace(nothing, none, direction_sets(1), 1)
 
 
 def estimate(
-    world: World, request: Request, settings: BakeSettings, progress: Progress | None = None
+    world: World, request: Request, settings: TraceSettings, progress: Progress | None = None
 ) -> Estimates:
     """Ambient occlusion at each point, the same bytes for any number of threads.
 
     progress : called in the calling thread with (points done, points in all); what it raises stops the
         work, as does a KeyboardInterrupt, within a fraction of a second
     """
-    count = len(request.positions)
-    result = Estimates.blank(count)
-    _block(
-        world, request, settings, slice(0, 0), result
-    )  # compiles here, where it can be interrupted
+    compile_kernels(world, request, settings)
+    work = Work.planned(world, request, settings)
     stop = threading.Event()
-
-    def work(block: slice) -> int:
-        if not stop.is_set():
-            _block(world, request, settings, block, result)
-        return int(block.stop - block.start)
-
-    threads = settings.threads or processors()
-    rays = settings.rays if settings.tolerance is None else settings.max_rays
-    blocks = list(_blocks(count, rays, threads))
-    with ThreadPoolExecutor(threads, "aobake") as pool:
+    with ThreadPoolExecutor(settings.threads or processors(), "aobake") as pool:
         try:
-            _watch([pool.submit(work, block) for block in blocks], count, progress)
+            _first_pass(work, partial(_over_blocks, pool, stop), progress)
+            if settings.tolerance is not None:
+                _rounds(work, partial(_over_blocks, pool, stop), progress)
         finally:
             stop.set()
-    return result
+    return _estimates(work)
+
+
+def _first_pass(work: Work, over_blocks: Callable[..., None], progress: Progress | None) -> None:
+    """Origins of all points, and their rays: all of them, or those of the first round."""
+    fixed = work.settings.tolerance is None
+    rays = work.settings.rays if fixed else FIRST_ROUND
+    sets = direction_sets(rays) if fixed else added_directions(0, rays)
+    sets = lobed(sets, work.settings.distribution, work.settings.spread)
+    if work.request.sets is not None:
+        sets = work.request.sets
+
+    def begin(chosen: IntArray) -> None:
+        _place(work, chosen)
+        _trace(work, chosen[_wants_rays(work.states[chosen])], sets, rays)
+
+    count = len(work.origins)
+    report = None
+    if progress is not None:
+        report = (lambda done: progress(done, count)) if fixed else (lambda _: progress(0, count))
+    over_blocks(begin, np.arange(count), rays, report)
+
+
+def _rounds(work: Work, over_blocks: Callable[..., None], progress: Progress | None) -> None:
+    """Let the sets of points grow until none has to."""
+    settings, tally, count = work.settings, work.tally, len(work.origins)
+    settled = 0
+    seen = np.flatnonzero(_wants_rays(work.states))
+    while True:
+        sizes, goals = tally.rays[seen], grown(tally, seen, settings)
+        growing = np.flatnonzero(goals > sizes)
+        settled = max(settled, count - len(growing))
+        if progress is not None:
+            progress(settled, count)
+        if len(growing) == 0:
+            return
+        report = None if progress is None else partial(_still, progress, settled, count)
+        steps = sizes[growing] * STEP + goals[growing]
+        for step in np.unique(steps).tolist():
+            size, goal = divmod(step, STEP)
+            added = lobed(added_directions(size, goal), settings.distribution, settings.spread)
+            grow = partial(_trace, work, sets=added, rays=goal - size)
+            over_blocks(grow, seen[growing[steps == step]], goal - size, report)
+
+
+def _still(progress: Progress, settled: int, count: int, _: int) -> None:
+    """Say what has been settled: a round settles points at its end."""
+    progress(settled, count)
+
+
+def _over_blocks(
+    pool: ThreadPoolExecutor,
+    stop: threading.Event,
+    function: Callable[[IntArray], None],
+    points: IntArray,
+    rays: int,
+    progress: Callable[[int], None] | None,
+) -> None:
+    """Call a function for all points, in blocks, in the threads of the pool."""
+
+    def run(block: IntArray) -> int:
+        if not stop.is_set():
+            function(block)
+        return len(block)
+
+    threads = pool._max_workers  # noqa: SLF001 - as many as it was made with
+    blocks = [points[block] for block in _blocks(len(points), rays, threads)]
+    _watch([pool.submit(run, block) for block in blocks], progress)
 
 
 def _blocks(count: int, rays: int, threads: int) -> Iterator[slice]:
@@ -149,139 +268,104 @@ def processors() -> int:
     return os.cpu_count() or 1
 
 
-def _watch(pending: list[Future[int]], total: int, progress: Progress | None) -> None:
+def _watch(pending: Sequence[Future[int]], progress: Callable[[int], None] | None) -> None:
     """Wait for all blocks, waking up often enough to notice an interrupt and to report."""
     done, waiting = 0, set(pending)
     while waiting:
         finished, waiting = wait(waiting, POLL_SECONDS, FIRST_COMPLETED)
         done += sum(future.result() for future in finished)
         if progress is not None:
-            progress(done, total)
+            progress(done)
 
 
-def _block(
-    world: World, request: Request, settings: BakeSettings, block: slice, result: Estimates
-) -> None:
-    """Fill one block of the result: origins, then rounds of rays."""
-    functions = embree.functions()
-    positions = world.frame.apply(request.positions[block])
-    normals = np.ascontiguousarray(request.normals[block])
-    origins = np.empty(positions.shape, np.float32)
-    states = np.zeros(len(positions), np.uint8)
+def _place(work: Work, chosen: IntArray) -> None:
+    """Find the origins of a block of points."""
+    functions, world = embree.functions(), work.world
+    origins = np.empty((len(chosen), 3), np.float32)
+    states = np.zeros(len(chosen), np.uint8)
     place_origins(
         (functions.point_query, note_triangle()),
         world.tree.address,
         world.arrays,
-        positions,
-        normals,
+        world.frame.apply(work.request.positions[chosen]),
+        np.ascontiguousarray(work.request.normals[chosen]),
         origins_scratch(),
         origins,
         states,
     )
-    result.states[block] = states
-    seen = np.flatnonzero(states != ENCLOSED)
-    mean, error, rays = _rounds(world, request, settings, block, origins, seen)
-    for values, filled in (
-        (result.mean, mean),
-        (result.standard_error, error),
-        (result.rays, rays),
-    ):
-        values[block] = 0
-        values[block][seen] = filled
+    if work.request.open is not None:
+        states[work.request.open[chosen] & (states == PLAIN)] = OPEN
+    work.origins[chosen], work.states[chosen] = origins, states
 
 
-def _rounds(
-    world: World,
-    request: Request,
-    settings: BakeSettings,
-    block: slice,
-    origins: NDArray[np.float32],
-    points: NDArray[np.int64],
-) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
-    """(mean, standard error, rays) of the chosen points of a block.
-
-    Sets of n rays are combined with weights n^1.5, the inverse of their variance: weights that do not
-    look at the values, so that the mean stays unbiased.
-    """
-    count = len(points)
-    total, weight = np.zeros(count), np.zeros(count)
-    variance, rays = np.zeros(count), np.zeros(count, np.int64)
-    wanted = np.full(
-        count, settings.rays if settings.tolerance is None else min(FIRST_ROUND, settings.max_rays)
-    )
-    number = 0
-    while (wanted > 0).any():
-        for size in np.unique(wanted[wanted > 0]).tolist():
-            chosen = np.flatnonzero(wanted == size)
-            sums = _trace(world, request, settings, block, origins, points[chosen], size, number)
-            counted = np.maximum(sums[:, 2], 1.0)
-            w = float(size) ** 1.5
-            total[chosen] += w * np.where(sums[:, 2] > 0, sums[:, 0] / counted, 1.0)
-            variance[chosen] += w * w * (SPREAD * sums[:, 1] + UNSEEN**2) / counted**2
-            weight[chosen] += w
-            rays[chosen] += sums[:, 2].astype(np.int64)
-        number += 1
-        if settings.tolerance is None:
-            break
-        wanted = _next_round(
-            np.sqrt(variance) / weight, rays, settings.tolerance, settings.max_rays
-        )
-    return total / np.maximum(weight, 1.0), np.sqrt(variance) / np.maximum(weight, 1.0), rays
+def _wants_rays(states: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Which points are not settled by what was found about them."""
+    return np.asarray((states != ENCLOSED) & (states != OPEN))
 
 
-def _next_round(
-    error: FloatArray, rays: NDArray[np.int64], tolerance: float, most: int
-) -> NDArray[np.int64]:
-    """Rays of the next round for each point, a power of two that should do; 0 where nothing is left to do.
-
-    The error of one set falls as n^-0.75, so a set that reaches the tolerance by itself has
-    n (error / tolerance)^(4/3) rays.
-    """
-    left = most - rays
-    needed = np.maximum(rays, 1) * (error / tolerance) ** (4.0 / 3.0)
-    size = 2.0 ** np.ceil(np.log2(np.maximum(needed, SMALLEST_ROUND)))
-    size = np.minimum(size, 2.0 ** np.floor(np.log2(np.maximum(left, 1))))
-    return np.where((error > tolerance) & (left >= SMALLEST_ROUND), size, 0).astype(np.int64)
-
-
-def _trace(
-    world: World,
-    request: Request,
-    settings: BakeSettings,
-    block: slice,
-    origins: NDArray[np.float32],
-    points: NDArray[np.int64],
-    rays: int,
-    number: int,
-) -> FloatArray:
-    """(P, 3) sums of one round over the given points of a block; see kernels.trace."""
-    functions, scale = embree.functions(), world.frame.scale
-    at = origins[points]
-    sums = np.empty((len(points), 3))
+def _trace(work: Work, chosen: IntArray, sets: NDArray[np.float32], rays: int) -> None:
+    """Trace the same number of rays from each of the chosen points, and add them to the tally."""
+    functions, settings, request = embree.functions(), work.settings, work.request
+    at, scale = work.origins[chosen], work.world.frame.scale
+    sums = np.empty((len(chosen), 3))
+    directions = None if work.open_directions is None else np.zeros((len(chosen), 3))
     geometric = None
     if request.geometric is not None:
-        geometric = request.geometric[block][points].astype(np.float32)
-    ground = None
-    if settings.ground is not None and request.ground is not None:
-        axis = "xyz".index(settings.ground[1])
-        level = (request.ground - world.frame.center[axis]) * scale
-        ground = (axis, np.maximum(at[:, axis] - np.float32(level), np.float32(0.0)))
+        geometric = request.geometric[chosen].astype(np.float32)
     falloff = {"none": None, "linear": LINEAR, "smooth": SMOOTH}[settings.falloff]
     far = np.inf if settings.max_distance is None else settings.max_distance * scale
     trace(
         (functions.occluded8, functions.intersect8),
-        world.tree.address,
+        work.world.tree.address,
         at,
-        request.normals[block][points].astype(np.float32),
+        request.normals[chosen].astype(np.float32),
         geometric,
-        request.numbers[block][points],
-        np.uint64((settings.seed + 0x9E3779B97F4A7C15 * number) % 2**64),
-        direction_sets(rays),
+        request.numbers[chosen],
+        np.uint64(settings.seed),
+        sets,
         rays,
         np.float32(far),
-        ground,
+        _ground(work, at),
         falloff,
         kernel_scratch(),
         sums,
+        directions,
     )
-    return sums
+    work.tally.add(chosen, sums, rays)
+    if work.open_directions is not None and directions is not None:
+        work.open_directions[chosen] += directions
+
+
+def _ground(work: Work, at: NDArray[np.float32]) -> tuple[int, NDArray[np.float32]] | None:
+    """The axis of the ground, and how high origins are above it; None where there is none."""
+    axis_name, level = work.settings.ground, work.request.ground
+    if axis_name is None or level is None:
+        return None
+    axis = "xyz".index(axis_name[1])
+    height = (level - work.world.frame.center[axis]) * work.world.frame.scale
+    return axis, np.maximum(at[:, axis] - np.float32(height), np.float32(0.0))
+
+
+def _estimates(work: Work) -> Estimates:
+    """Means and errors of what was counted; 0 without an error where a point is enclosed, 1 where it is open."""
+    mean, error = work.tally.mean(), work.tally.standard_error()
+    mean[work.states == ENCLOSED] = 0.0
+    error[work.states == ENCLOSED] = 0.0
+    return Estimates(
+        mean=mean.astype(np.float32),
+        standard_error=error.astype(np.float32),
+        rays=work.tally.counted.astype(np.int32),
+        states=work.states,
+        bent=None if work.open_directions is None else _bent(work, work.open_directions),
+    )
+
+
+def _bent(work: Work, directions: FloatArray) -> NDArray[np.float32]:
+    """(P, 3) the mean open directions at unit length; the normals where nothing was open, or nothing traced.
+
+    Source: H. Landis, Production-ready global illumination, SIGGRAPH course notes 16, 2002.
+    """
+    length = np.linalg.norm(directions, axis=1, keepdims=True)
+    told = (length > 0.0) & _wants_rays(work.states)[:, None]
+    mean = directions / np.where(told, length, 1.0)
+    return np.where(told, mean, work.request.normals).astype(np.float32)

@@ -2,7 +2,7 @@
 
 A point's rays go out in packets of eight neighbouring directions, made here, traced by Embree and
 counted at once; they never exist in memory together. A feature that is off (a ground, a limit by the
-geometric normal) is passed as None, for which numba compiles a kernel without it.
+geometric normal, a sum of open directions) is passed as None, for which numba compiles a kernel without it.
 
 The error estimate comes from the same pass: along a Hilbert curve over the hemisphere the squared
 differences of successive values add up to a measure of how long the boundary of the visible region is
@@ -28,7 +28,7 @@ __all__ = ["LINEAR", "SMOOTH", "scratch", "trace"]
 LINEAR, SMOOTH = 0, 1
 
 # Rows of RTCRay8 and RTCHit8, eight 32-bit values each.
-ORIGIN, NEAR, DIRECTION, TIME, FAR, MASK, FLAGS = 0, 3, 4, 7, 8, 9, 11
+ORIGIN, NEAR, DIRECTION, TIME, FAR, MASK, RAY_NUMBER, FLAGS = 0, 3, 4, 7, 8, 9, 10, 11
 GEOMETRY_ID, INSTANCE_ID = 18, 19
 RAY_HIT_FLOATS = 21 * 8
 
@@ -144,12 +144,27 @@ def stop_at_ground(valid, rays, ground, point, falloff):
 
 
 @inlined
+def forget_hits(words):
+    """What Embree wants to find in a packet whose nearest hits it is to look for."""
+    for k in range(8):
+        words[8 * GEOMETRY_ID + k] = -1
+        words[8 * INSTANCE_ID + k] = -1
+
+
+@inlined
 def openness(reached, far, falloff):
     """How open a ray counts that got as far as `reached`: 1 for one that met nothing."""
     if falloff is None:
         return 1.0 if reached >= 0.0 else 0.0
     u = min(max(reached / far, 0.0), 1.0)
     return u if falloff == LINEAR else u * u * (3.0 - 2.0 * u)
+
+
+@inlined
+def add_direction(sums, point, rays, k, value):
+    """Add the direction of ray k, as much as it is open."""
+    for i in range(3):
+        sums[point, i] += value * rays[8 * (DIRECTION + i) + k]
 
 
 def scratch() -> tuple[
@@ -176,6 +191,7 @@ def trace(
     falloff,
     scratch,
     out,
+    open_directions,
 ):
     """Trace `rays` directions from each point and add up how open they are.
 
@@ -190,6 +206,7 @@ def trace(
     falloff : LINEAR or SMOOTH, for which the nearest hit is looked for; None: any hit closes a ray
     scratch : of scratch()
     out : (P, 3) float64: sum of openness, sum of squared successive differences, rays counted
+    open_directions : (P, 3) float64, to which directions are added, each as much as it is open; or None
     """
     packet, words, masks, frame = scratch
     valid, counts = masks[:8], masks[8:16]
@@ -209,18 +226,19 @@ def trace(
             )
             for k in range(8):
                 valid[k] = counts[k]
+                words[8 * RAY_NUMBER + k] = 8 * number + k  # for filters that draw by it
             if ground is not None:
                 stop_at_ground(valid, packet, ground, point, falloff)
             if falloff is not None:
-                for k in range(8):
-                    words[8 * GEOMETRY_ID + k] = -1
-                    words[8 * INSTANCE_ID + k] = -1
+                forget_hits(words)
             call_packet(call, masks.ctypes.data, scene, packet.ctypes.data)
             for k in range(8):
                 if counts[k] != 0:
                     value = openness(packet[8 * FAR + k], far, falloff)
                     total += value
                     counted += 1
+                    if open_directions is not None:
+                        add_direction(open_directions, point, packet, k, value)
                     if before >= 0.0:
                         rough += (value - before) * (value - before)
                     before = value

@@ -29,6 +29,7 @@ __all__ = [
     "CONTACT",
     "DOUBTFUL",
     "ENCLOSED",
+    "OPEN",
     "PLAIN",
     "SLIVERS",
     "THIN",
@@ -37,8 +38,8 @@ __all__ = [
     "scratch",
 ]
 
-# what was found about a point; UNRESOLVED is found where frames are chosen
-PLAIN, SLIVERS, CONTACT, THIN, DOUBTFUL, ENCLOSED, UNRESOLVED = range(7)
+# what was found about a point; OPEN (everything lies below it) and UNRESOLVED are not found here
+PLAIN, OPEN, SLIVERS, CONTACT, THIN, DOUBTFUL, ENCLOSED, UNRESOLVED = range(8)
 
 SEARCH_ULPS = 32.0  # radius of what counts as touching, in ulps of the point's largest coordinate
 SMALLEST = 1e-20  # coordinates below this are as good as 0

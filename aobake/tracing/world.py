@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from aobake.tracing import embree
 from aobake.tracing.conditioning import UnitFrame, detail_at_vertices, split_long_edges, unit_frame
+from aobake.tracing.embree import HitFilter
 
 __all__ = ["Placement", "Triangles", "Watched", "World", "build_world"]
 
@@ -35,12 +36,13 @@ class Triangles:
 
     vertices : (V, 3) float64; faces with a vertex that is not finite must have been left out
     faces : (F, 3) uint32
-    hit_filter : address of Embree's filter function for these triangles; 0: every hit counts
+    hit_filter : decides which hits on these triangles count; None: all do. With data of its own for each
+        triangle they are traced as they are: large ones are not split
     """
 
     vertices: FloatArray
     faces: NDArray[np.uint32]
-    hit_filter: int = 0
+    hit_filter: HitFilter | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,7 @@ class _Body:
 
     vertices: FloatArray
     faces: NDArray[np.uint32]
-    hit_filter: int
+    hit_filter: HitFilter | None
 
 
 def build_world(
@@ -114,16 +116,17 @@ def build_world(
     return World(_tree(bodies, arrays), frame, arrays)
 
 
-def _can_be_instanced(transform: FloatArray, hit_filter: int) -> bool:
+def _can_be_instanced(transform: FloatArray, hit_filter: HitFilter | None) -> bool:
     """Whether an instance can have this transform; otherwise its triangles are put in place.
 
-    One that flattens has no inverse. One that mirrors shows its filter function a space in which fronts
-    are backs.
+    One that flattens has no inverse. One that mirrors shows a filter function that tells sides a space
+    in which fronts are backs.
     """
     linear = transform[:, :3]
     size = float(np.abs(linear).max())
     volume = float(np.linalg.det(linear / size)) if size > 0.0 else 0.0
-    return abs(volume) > 1e-6 and not (hit_filter and volume < 0.0)
+    sided = hit_filter is not None and hit_filter.sided
+    return abs(volume) > 1e-6 and not (sided and volume < 0.0)
 
 
 def _place(transform: FloatArray, points: FloatArray) -> FloatArray:
@@ -140,6 +143,11 @@ def _spread(part: Triangles) -> FloatArray:
     return part.vertices if used.all() else part.vertices[used]
 
 
+def _as_they_are(part: Triangles) -> bool:
+    """Whether a filter knows these triangles by their numbers, so that each has to stay one."""
+    return part.hit_filter is not None and part.hit_filter.data is not None
+
+
 def _fixed_bodies(
     parts: Sequence[Triangles],
     fixed: Sequence[Placement],
@@ -147,7 +155,7 @@ def _fixed_bodies(
     frame: UnitFrame,
     watched: Watched | None,
 ) -> list[_Body]:
-    """One body per filter, of all that stands where it is, with large triangles split."""
+    """What stands where it is: one body per filter with large triangles split, others as they are."""
     placed = [frame.apply(_place(p.transform, parts[p.part].vertices)) for p in [*fixed, *moving]]
     sizes = [
         detail_at_vertices(at, parts[p.part].faces)
@@ -157,12 +165,16 @@ def _fixed_bodies(
     if watched is not None:
         details.append(frame.apply(watched.positions))
         sizes.append(np.full(len(watched.positions), watched.detail * frame.scale))
-    bodies = []
-    for hit_filter in sorted({parts[p.part].hit_filter for p in fixed}):
+    standing = [(at, parts[p.part]) for at, p in zip(placed, fixed, strict=False)]
+    bodies = [
+        _Body(at, part.faces, part.hit_filter) for at, part in standing if _as_they_are(part)
+    ]
+    plain = [(at, part) for at, part in standing if not _as_they_are(part)]
+    for hit_filter in dict.fromkeys(part.hit_filter for _, part in plain):
         split = [
-            split_long_edges(at, parts[p.part].faces, details, sizes)
-            for at, p in zip(placed, fixed, strict=False)
-            if parts[p.part].hit_filter == hit_filter
+            split_long_edges(at, part.faces, details, sizes)
+            for at, part in plain
+            if part.hit_filter is hit_filter
         ]
         first = np.cumsum([0, *(len(vertices) for vertices, _ in split)])
         faces = [

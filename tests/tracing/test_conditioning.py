@@ -11,6 +11,7 @@ from aobake import BakeSettings, Scene, bake_vertices
 from aobake.tracing.conditioning import (
     COARSER,
     FINEST,
+    NEAR,
     detail_at_vertices,
     split_long_edges,
     unit_frame,
@@ -26,6 +27,7 @@ from tests.scenes import (
     joined,
     moved,
     patch,
+    unit,
 )
 
 
@@ -152,6 +154,40 @@ def test_a_tiny_edge_on_a_large_ground_does_not_split_it_without_end() -> None:
     speck = moved(icosphere(0), 1e-12, (0.1, 0.2, 0.0))
     cut = split(floor(1e6), speck, icosphere(1))
     assert len(cut.faces) < 250_000
+
+
+def distance(point: FloatArray, corners: FloatArray) -> FloatArray:
+    """(F,) from a point to triangles (F, 3, 3)."""
+    nearest = np.full(len(corners), np.inf)
+    a, b, c = corners.transpose(1, 0, 2)
+    for p, q in ((a, b), (b, c), (c, a)):
+        t = ((point - p) * (q - p)).sum(axis=1) / ((q - p) ** 2).sum(axis=1)
+        foot = p + np.clip(t, 0.0, 1.0)[:, None] * (q - p)
+        nearest = np.minimum(nearest, np.linalg.norm(foot - point, axis=1))
+    front = np.cross(b - a, c - a)
+    above = ((point - a) * front).sum(axis=1) / np.linalg.norm(front, axis=1)
+    sides = [(np.cross(q - p, point - p) * front).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))]
+    within = np.min(sides, axis=0) >= 0.0
+    return np.where(within, np.minimum(nearest, np.abs(above)), nearest)
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-2, 1e3])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_face_is_fine_beside_a_point_in_its_midst(height: float, seed: int) -> None:
+    """Whatever the shape of the face and the place on it, as a vertex there would have it."""
+    rng = np.random.default_rng(seed)
+    corners = 1e6 * rng.normal(size=(3, 3)) * rng.uniform(0.01, 1.0, (1, 3))
+    front = unit(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
+    corners -= rng.dirichlet(np.ones(3)) @ corners + height * front  # the point is at the origin
+    size = 0.01
+    vertices, faces = split_long_edges(
+        corners, np.array([(0, 1, 2)], np.uint32), [np.zeros((1, 3))], [np.full(1, size)]
+    )
+    parts = vertices[faces]
+    longest = np.linalg.norm(parts - np.roll(parts, 1, axis=1), axis=2).max(axis=1)
+    allowed = COARSER * FINEST * size + NEAR * distance(np.zeros(3), parts)
+    assert (longest <= 1.001 * allowed).all()
+    assert len(faces) < 500
 
 
 # -- what it is for -------------------------------------------------------------------------------

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
-from aobake.tracing.sampling import LANES, SETS, direction_sets, vogel_disc
+from aobake.tracing.sampling import (
+    LANES,
+    SETS,
+    added_directions,
+    direction_sets,
+    spiral_lattice,
+    vogel_disc,
+)
 from tests.scenes import FloatArray
 
 
@@ -68,3 +76,29 @@ def test_sets_are_made_once_and_cannot_be_changed() -> None:
     assert direction_sets(32) is direction_sets(32)
     with pytest.raises(ValueError, match="read-only"):
         direction_sets(32)[0, 0, 0, 0] = 0.0
+
+
+@pytest.mark.parametrize(("before", "after"), [(32, 64), (64, 512), (1024, 2048)])
+def test_a_set_that_grows_keeps_its_directions(before: int, after: int) -> None:
+    """What is there and what is added make up the larger set, each direction once."""
+    for number in range(SETS):
+        parts = [added_directions(0, before), added_directions(before, after)]
+        grown = np.concatenate([part[number].transpose(0, 2, 1).reshape(-1, 3) for part in parts])
+        whole = added_directions(0, after)[number].transpose(0, 2, 1).reshape(-1, 3)
+        assert len(grown) == after
+        by_place = [np.lexsort(np.round(each.T, 5)) for each in (grown, whole)]
+        assert np.allclose(grown[by_place[0]], whole[by_place[1]], atol=1e-5)
+
+
+@pytest.mark.parametrize("count", [32, 256, 4096, 1 << 15])
+def test_a_set_that_grows_is_spread_evenly_at_every_size(count: int) -> None:
+    """Every wedge and every ring of the disc has its share; no two points come close."""
+    points = spiral_lattice(np.arange(count), count, 0.3)
+    area = np.sum(points**2, axis=1)
+    angle = (np.arctan2(points[:, 1], points[:, 0]) / (2.0 * np.pi)) % 1.0
+    bins = round(count**0.5 / 2)
+    for values in (area, angle):
+        held = np.bincount((values * bins).astype(int), minlength=bins)
+        assert np.abs(held - count / bins).max() <= 0.35 * count / bins + 2
+    nearest = cKDTree(points).query(points, k=2)[0][:, 1]
+    assert nearest.min() > 0.45 * np.sqrt(np.pi / count)
