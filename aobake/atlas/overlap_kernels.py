@@ -1,0 +1,94 @@
+"""Which charts lie over themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aobake.tracing.compiled import inlined, kernel
+
+__all__ = ["note_overlaps"]
+
+MOST_CELLS = 32  # that a triangle is entered in, on average; a coarser grid else
+
+
+@inlined
+def _apart(uv, one, other, least):
+    """Whether an edge of one triangle has the other beyond it, but for `least`. Triangles turn left."""
+    for k in range(3):
+        x, y = uv[one, k, 0], uv[one, k, 1]
+        dx, dy = uv[one, (k + 1) % 3, 0] - x, uv[one, (k + 1) % 3, 1] - y
+        size = np.sqrt(dx * dx + dy * dy)
+        inmost = -np.inf
+        for n in range(3):
+            inmost = max(inmost, dx * (uv[other, n, 1] - y) - dy * (uv[other, n, 0] - x))
+        if inmost <= least * size:
+            return True
+    return False
+
+
+@inlined
+def _cells(uv, f, low_u, low_v, size, cells):
+    """First and last column and row of the cells that a triangle's box touches."""
+    u0, u1 = min(uv[f, 0, 0], uv[f, 1, 0], uv[f, 2, 0]), max(uv[f, 0, 0], uv[f, 1, 0], uv[f, 2, 0])
+    v0, v1 = min(uv[f, 0, 1], uv[f, 1, 1], uv[f, 2, 1]), max(uv[f, 0, 1], uv[f, 1, 1], uv[f, 2, 1])
+    last = cells - 1
+    return (
+        min(int((u0 - low_u) / size * cells), last),
+        min(int((u1 - low_u) / size * cells), last),
+        min(int((v0 - low_v) / size * cells), last),
+        min(int((v1 - low_v) / size * cells), last),
+    )
+
+
+@kernel
+def _overlaps(uv, chosen, tolerance):  # noqa: C901, PLR0912 - a grid is filled and looked up at once
+    """Whether any two of the chosen triangles overlap by more than a share of the whole."""
+    low_u = low_v = np.inf
+    high_u = high_v = -np.inf
+    for f in chosen:
+        for k in range(3):
+            low_u, high_u = min(low_u, uv[f, k, 0]), max(high_u, uv[f, k, 0])
+            low_v, high_v = min(low_v, uv[f, k, 1]), max(high_v, uv[f, k, 1])
+    size = max(high_u - low_u, high_v - low_v)
+    if not size > 0.0:
+        return False
+    cells, entries = int(np.sqrt(2.0 * len(chosen))) + 1, np.int64(0)
+    while True:
+        start, entries = np.zeros(cells * cells + 1, np.int64), np.int64(0)
+        for f in chosen:
+            c0, c1, r0, r1 = _cells(uv, f, low_u, low_v, size, cells)
+            entries += (c1 - c0 + 1) * (r1 - r0 + 1)
+            for r in range(r0, r1 + 1):
+                for c in range(c0, c1 + 1):
+                    start[r * cells + c + 1] += 1
+        if entries <= MOST_CELLS * len(chosen) or cells == 1:
+            break
+        cells = (cells + 1) // 2
+    for n in range(cells * cells):
+        start[n + 1] += start[n]
+    filled, entry = start[:-1].copy(), np.empty(entries, np.int32)
+    for f in chosen:
+        c0, c1, r0, r1 = _cells(uv, f, low_u, low_v, size, cells)
+        for r in range(r0, r1 + 1):
+            for c in range(c0, c1 + 1):
+                n = r * cells + c
+                for other in entry[start[n] : filled[n]]:
+                    if not _apart(uv, f, other, tolerance * size) and not _apart(
+                        uv, other, f, tolerance * size
+                    ):
+                        return True
+                entry[filled[n]] = f
+                filled[n] += 1
+    return False
+
+
+@kernel
+def note_overlaps(uv, order, starts, tolerance, found):
+    """Fill found (charts,) bool: whether two triangles of a chart overlap.
+
+    uv : (F, 3, 2) float64, triangles that turn left; thinner ones than `tolerance` overlap nothing
+    order, starts : the faces of chart c are order[starts[c] : starts[c + 1]]
+    tolerance : share of the chart's size by which triangles may overlap
+    """
+    for c in range(len(found)):
+        found[c] = _overlaps(uv, order[starts[c] : starts[c + 1]], tolerance)

@@ -1,0 +1,71 @@
+"""What becomes of a traced page before it is an image: denoised, an old texture taken in, seams made equal,
+gutters filled.
+
+In this order: what is in an old texture is no noise, noise would be taken for seams, and gutters repeat what
+the charts have at their rims.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aobake.atlas.gutter import fill_gutters
+from aobake.atlas.seams import Seams, equalised
+from aobake.stages import timed
+
+__all__ = ["TracedPage", "finished"]
+
+Float32Array = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TracedPage:
+    """A page of texels as it was traced.
+
+    values : (H, W) float32 in [0, 1]; texels of charts that are not finite count as gutters
+    error : (H, W) float32, the standard error of each
+    chart : (H, W) int32, the chart of each texel, numbered from 0; -1: none
+    normal : (H, W, 3) float32, unit length, which guides the denoiser; or None
+    before : (H, W) float32, what an occlusion texture held, which is multiplied in; None: nothing is
+    """
+
+    values: Float32Array
+    error: Float32Array
+    chart: NDArray[np.int32]
+    normal: Float32Array | None
+    before: Float32Array | None = None
+
+
+def finished(
+    page: TracedPage,
+    seams: Seams,
+    *,
+    denoise: bool,
+    threads: int | None = None,
+    seconds: dict[str, float] | None = None,
+) -> Float32Array:
+    """The lightmap of a page: (H, W) float32 in [0, 1], finite everywhere, and white where no chart is near.
+
+    denoise : whether Open Image Denoise smooths it; needs pyoidn
+    threads : for the denoiser; None: one per processor. The result does not depend on it
+    seconds : stage -> seconds ("denoise", "finish"), added to
+    A page without charts is white. Raises EngineError where the denoiser is missing.
+    """
+    spent = {} if seconds is None else seconds
+    covered = (page.chart >= 0) & np.isfinite(page.values)
+    chart = np.where(covered, page.chart, np.int32(-1))
+    values = np.clip(np.where(covered, page.values, np.float32(1.0)), 0.0, 1.0)
+    error = np.nan_to_num(page.error, nan=0.0, posinf=1.0)
+    if denoise:
+        from aobake.atlas.denoise import denoised
+
+        with timed(spent, "denoise"):
+            values = denoised(values, error, chart, page.normal, threads=threads)
+    with timed(spent, "finish"):
+        if page.before is not None:
+            values = values * np.where(covered, page.before, np.float32(1.0))
+        values = equalised(values, error, covered, seams)
+        return fill_gutters(values, covered)

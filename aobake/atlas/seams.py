@@ -1,0 +1,198 @@
+"""Seams of an atlas: both sides of a chart's boundary are made to look up the same values.
+
+Along each seam, places are spread that lie on one point of the surface and on two of the page. The texels
+that a bilinear lookup reads there are moved so that both lookups agree, as little as their errors allow:
+
+    minimise  sum over places (lookup on one side - lookup on the other)^2
+            + STAY sum over texels ((value - baked value) / error)^2      errors relative to the middle one
+
+Source: M. Iwanicki, Lighting technology of The Last of Us, SIGGRAPH talks, 2013.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aobake.atlas.seam_kernels import add_normal_product
+from aobake.meshes.coincident import first_equal_row
+from aobake.meshes.scene import FloatArray, IntArray
+
+__all__ = ["Seams", "equalised", "find_seams", "joined_seams"]
+
+Float32Array = NDArray[np.float32]
+
+SAME_UV = 1e-6  # a hundredth of a texel of the largest usual page
+CREASE = math.cos(
+    math.radians(2.0)
+)  # normals farther apart see different hemispheres: a step is right there
+PLACES_PER_TEXEL = 2
+STAY = 0.01  # the step that is left is about this share of what it was
+LEAST_ERROR = 0.1  # of the middle one, lest a texel be nailed down
+MOST_ROUNDS = 200
+GOOD_ENOUGH = 1e-3  # of the first residual; a hundredth of that changes no step by more than 2e-4
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Seams:
+    """Edges of a surface that lie in two places of a page.
+
+    uv : (E, 2, 2, 2) float64, edge, side, end, coordinate; both sides run in the same direction; v runs down
+    smooth : (E,) bool, whether the normals of both sides agree, so that the values should, too
+    """
+
+    uv: FloatArray
+    smooth: NDArray[np.bool_]
+
+
+def find_seams(vertices: FloatArray, faces: IntArray, uv: FloatArray, normals: FloatArray) -> Seams:
+    """The seams of a mesh: edges of two faces that have other texture coordinates in each.
+
+    vertices : (V, 3) float64; vertices at one place count as one
+    faces : (F, 3) int32, those that have a place on the page
+    uv : (F, 3, 2) float64 of their corners; normals : (F, 3, 3) float64, unit length, at their corners
+    Where more than two faces meet at an edge, neighbours in the order of faces are paired. No faces give no
+    seams.
+    """
+    place = first_equal_row(vertices)[faces].astype(np.int64)
+    start, end = place, np.roll(place, -1, axis=1)
+    low, high = np.minimum(start, end).reshape(-1), np.maximum(start, end).reshape(-1)
+    key = low * (len(vertices) + 1) + high
+    order = np.argsort(key, kind="stable")
+    order = order[low[order] != high[order]]
+    paired = key[order[:-1]] == key[order[1:]]
+    pairs = np.stack([order[:-1][paired], order[1:][paired]], axis=1)
+    runs_up = (start <= end).reshape(-1)[pairs]
+    along_uv = _along(uv, pairs, runs_up)
+    along_normals = _along(normals, pairs, runs_up)
+    apart = np.abs(along_uv[:, 0] - along_uv[:, 1]).max(axis=(1, 2), initial=0.0) > SAME_UV
+    agree = np.einsum("eij,eij->ei", along_normals[:, 0], along_normals[:, 1]).min(
+        axis=1, initial=1.0
+    )
+    return Seams(uv=along_uv[apart], smooth=agree[apart] >= CREASE)
+
+
+def joined_seams(several: Sequence[Seams]) -> Seams:
+    """The seams of all layouts of a page."""
+    if not several:
+        return Seams(uv=np.zeros((0, 2, 2, 2)), smooth=np.zeros(0, np.bool_))
+    return Seams(
+        uv=np.concatenate([seams.uv for seams in several]),
+        smooth=np.concatenate([seams.smooth for seams in several]),
+    )
+
+
+def equalised(
+    values: Float32Array, error: Float32Array, covered: NDArray[np.bool_], seams: Seams
+) -> Float32Array:
+    """A page on which bilinear lookups agree on both sides of every smooth seam.
+
+    values : (H, W) float32 in [0, 1]; error : (H, W) float32, their standard errors: where it is small, a
+        value moves less
+    covered : (H, W) bool; places whose lookup reads another texel are left out
+    Returns (H, W) float32 in [0, 1]; only texels that a lookup on a seam reads have moved.
+    """
+    texel, weight = _equations(seams, covered)
+    unknown, inverse = np.unique(texel, return_inverse=True)
+    result = values.copy()
+    if len(unknown) == 0:
+        return result
+    equations = inverse.reshape(texel.shape).astype(np.int32), weight
+    flat = result.reshape(-1)
+    start = flat[unknown].astype(np.float64)
+    moved = start + _least_change(equations, start, _stiffness(error.reshape(-1)[unknown]))
+    flat[unknown] = np.clip(moved, 0.0, 1.0)
+    return result
+
+
+def _along(corners: FloatArray, pairs: NDArray[np.int64], runs_up: NDArray[np.bool_]) -> FloatArray:
+    """(E, 2, 2, K): what corners (F, 3, K) have at both ends of each side of paired half-edges."""
+    first = corners.reshape(-1, corners.shape[2])
+    second = np.roll(corners, -1, axis=1).reshape(-1, corners.shape[2])
+    ends = np.stack([first[pairs], second[pairs]], axis=2)
+    return np.where(runs_up[:, :, np.newaxis, np.newaxis], ends, ends[:, :, ::-1])
+
+
+def _equations(
+    seams: Seams, covered: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """(S, 8) texels, row * W + column, and their factors in: one lookup - the other = 0."""
+    height, width = covered.shape
+    at = _places(seams.uv[seams.smooth] * (width, height)) - 0.5
+    corner = np.floor(at).astype(np.int64)
+    part = at - corner
+    texels, factors = [], []
+    for dy in (0, 1):
+        for dx in (0, 1):
+            column = np.clip(corner[..., 0] + dx, 0, width - 1)
+            row = np.clip(corner[..., 1] + dy, 0, height - 1)
+            across = part[..., 0] if dx else 1.0 - part[..., 0]
+            down = part[..., 1] if dy else 1.0 - part[..., 1]
+            texels.append(row * width + column)
+            factors.append(across * down * (1.0, -1.0))
+    texel = np.stack(texels, axis=-1).reshape(-1, 8)
+    weight = np.stack(factors, axis=-1).reshape(-1, 8)
+    known = (covered.reshape(-1)[texel] | (weight == 0.0)).all(axis=1)
+    return texel[known], weight[known]
+
+
+def _places(ends: FloatArray) -> FloatArray:
+    """(S, 2, 2) places on both sides of seams (E, 2, 2, 2), given in texels: evenly spread, ends included."""
+    length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max(axis=1, initial=0.0)
+    steps = np.maximum(np.ceil(length * PLACES_PER_TEXEL), 1.0).astype(np.int64)
+    seam = np.repeat(np.arange(len(ends)), steps + 1)
+    first = np.cumsum(steps + 1) - (steps + 1)
+    share = (np.arange(len(seam)) - first[seam]) / steps[seam]
+    start, end = ends[seam, :, 0], ends[seam, :, 1]
+    return np.asarray(start + share[:, np.newaxis, np.newaxis] * (end - start))
+
+
+def _stiffness(error: Float32Array) -> FloatArray:
+    """What it costs to move each texel."""
+    middle = float(np.median(error))
+    if not middle > 0.0:
+        return np.full(len(error), STAY)
+    relative = np.maximum(error.astype(np.float64) / middle, LEAST_ERROR)
+    return np.asarray(STAY / np.square(relative))
+
+
+def _least_change(
+    equations: tuple[IntArray, FloatArray], start: FloatArray, stiffness: FloatArray
+) -> FloatArray:
+    """Solve (A^T A + stiffness) change = -A^T A start by conjugate gradients, scaled by the diagonal.
+
+    Source: M. Hestenes, E. Stiefel, Methods of conjugate gradients for solving linear systems, 1952.
+    """
+    texel, weight = equations
+
+    def product(x: FloatArray) -> FloatArray:
+        result = np.zeros_like(x)
+        add_normal_product(texel, weight, x, result)
+        return result
+
+    diagonal = stiffness + np.bincount(texel.reshape(-1), np.square(weight).reshape(-1), len(start))
+    change = np.zeros_like(start)
+    residual = -product(start)
+    scaled = residual / diagonal
+    direction = scaled.copy()
+    size = first = _dot(residual, scaled)
+    for _ in range(MOST_ROUNDS):
+        if size <= GOOD_ENOUGH**2 * first or size == 0.0:
+            break
+        image = product(direction) + stiffness * direction
+        step = size / _dot(direction, image)
+        change += step * direction
+        residual -= step * image
+        scaled = residual / diagonal
+        last, size = size, _dot(residual, scaled)
+        direction = scaled + (size / last) * direction
+    return change
+
+
+def _dot(a: FloatArray, b: FloatArray) -> float:
+    """Not by BLAS, which adds up in another order for another number of threads."""
+    return float(np.einsum("i,i->", a, b))
