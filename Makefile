@@ -3,6 +3,7 @@
 # make install set up only: everything goes into ./.venv, nothing outside of it is touched
 # make check   format, lint, strict types, tests
 # make bench   the measurements that the documents quote
+# make viewer  build the viewer of `aobake view` anew, from the versions that viewer/ pins; needs node and npm
 # make fuzz    damaged files to every reader, for FUZZ_SECONDS (60); what breaks is kept in .fuzz/failures
 #
 # PYTHON=python3.12 chooses an interpreter, VENV=folder another place.
@@ -18,7 +19,7 @@ export PIP_REQUIRE_VIRTUALENV := 1
 unexport PIP_USER PYTHONHOME PYTHONPATH
 
 .DELETE_ON_ERROR:
-.PHONY: demo test install check lint bench fuzz clean
+.PHONY: demo test install check lint bench viewer fuzz clean
 
 demo: install
 	@$(BIN)/aobake demo -o aobake-demo --force
@@ -39,12 +40,16 @@ lint: install
 bench: install
 	@for benchmark in benchmarks/*.py; do $(BIN)/python "$$benchmark" || exit 1; done
 
+viewer:
+	@command -v npm >/dev/null || { echo "aobake: building the viewer needs node 20 or newer, with npm." >&2; exit 1; }
+	@cd viewer && npm ci --ignore-scripts --no-audit --no-fund --silent && npm run --silent build
+
 fuzz: install
 	@"$(BIN)/python" -m pip install --quiet --editable ".[fuzz]"
 	@$(BIN)/python -m fuzz.run --seconds $(FUZZ_SECONDS)
 
 clean:
-	rm -rf "$(VENV)" .fuzz aobake-demo build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf "$(VENV)" viewer/node_modules .fuzz aobake-demo build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 # The stamp is written last, so that an interrupted set-up is taken up again.
 $(STAMP): pyproject.toml

@@ -19,9 +19,8 @@ pytestmark = pytest.mark.skipif(not IN_CHECKOUT, reason="not a checkout")
 
 
 def packaged() -> set[str]:
-    files = [
-        p for p in (ROOT / "aobake").rglob("*") if p.is_file() and p.suffix in {".py", ".typed"}
-    ]
+    kinds = {".py", ".typed", ".html", ".css", ".js", ".json", ".txt"}
+    files = [p for p in (ROOT / "aobake").rglob("*") if p.is_file() and p.suffix in kinds]
     return {p.relative_to(ROOT).as_posix() for p in files}
 
 

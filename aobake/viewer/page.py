@@ -1,0 +1,78 @@
+"""The page itself: text around a GLB and the viewer, all in one file."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import string
+from collections.abc import Sequence
+from importlib.resources import files
+
+from aobake import __version__
+from aobake.errors import OutputError
+from aobake.meshes.formats.gltf.container import Bytes
+
+__all__ = ["page_of"]
+
+DRACO = b"KHR_draco_mesh_compression"
+MOST_BYTES = (
+    256 << 20
+)  # browsers hold a text of half a gigabyte, and base64 makes four bytes of three
+
+
+def page_of(glb: Bytes, name: str, facts: Sequence[str] = ()) -> bytes:
+    """A page that shows a GLB with its ambient occlusion on, off and alone, and asks the network for nothing.
+
+    glb : with everything in it, as packed_glb gives it
+    name : title of the page, any text
+    facts : what to say below it, each a few words
+    Returns the HTML file. Its policy forbids every request and every script but its own.
+    Raises OutputError for a GLB of more than 256 MiB, which browsers could not open.
+    """
+    if len(glb) > MOST_BYTES:
+        raise OutputError(
+            f"{name}: it takes {len(glb) >> 20} MiB with all its textures, and a page holds {MOST_BYTES >> 20}. "
+            "Use smaller textures, or compress it."
+        )
+    parts = ["draco", "viewer"] if DRACO in _json_of(glb) else ["viewer"]
+    scripts = [_vendored(f"{part}.min.js") for part in parts]
+    style = _text("page.css")
+    text = string.Template(_text("page.html")).substitute(
+        policy=html.escape(_policy(scripts, style)),
+        version=html.escape(__version__),
+        name=html.escape(name),
+        facts=html.escape(" · ".join(facts)),
+        style=style,
+        licences="\n".join(_vendored(f"{part}.licences.txt") for part in parts),
+        asset=base64.b64encode(glb).decode("ascii"),
+        scripts="\n".join(f"<script>{script}</script>" for script in scripts),
+    )
+    return text.encode("utf-8", "replace")  # a name may hold what is no character
+
+
+def _json_of(glb: Bytes) -> bytes:
+    """The JSON of a GLB, which is its first chunk."""
+    return bytes(glb[20 : 20 + int.from_bytes(glb[12:16], "little")])
+
+
+def _policy(scripts: Sequence[str], style: str) -> str:
+    """What the page may do: run these scripts and their WebAssembly, and show images of its own making."""
+    allowed = " ".join(_hash(script) for script in scripts)
+    return (
+        f"default-src 'none'; script-src {allowed} 'wasm-unsafe-eval'; style-src {_hash(style)}; "
+        "img-src blob: data:; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _hash(text: str) -> str:
+    digest = hashlib.sha256(text.encode("utf-8")).digest()
+    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
+
+
+def _text(name: str) -> str:
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+def _vendored(name: str) -> str:
+    return _text(f"vendor/{name}")
