@@ -5,94 +5,59 @@ This file imports neither numpy nor the tracer, so that `import aobake` stays li
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from aobake.overrides import forced
+from aobake.planning.directions import direction_effects
+from aobake.planning.effect import Effect, Plan
+from aobake.planning.motion import animation
+from aobake.planning.occluders import occluder_effects
+from aobake.planning.surfaces import texture_effects, vertex_effects
 from aobake.settings import BakeSettings
 
 if TYPE_CHECKING:
     from aobake.meshes.scene import Scene
 
-__all__ = ["Effect", "Plan", "plan"]
-
-
-@dataclass(frozen=True)
-class Effect:
-    """One thing that a bake can simulate.
-
-    on : whether it is simulated
-    reason : one sentence that says why, or why not
-    cost : what it multiplies the seconds of tracing by, when on
-    """
-
-    on: bool
-    reason: str
-    cost: float = 1.0
-
-
-@dataclass(frozen=True)
-class Plan:
-    """effects : name -> Effect, in the order in which they are explained."""
-
-    effects: Mapping[str, Effect]
+__all__ = ["Effect", "Plan", "plan", "texture_plan"]
 
 
 def plan(scene: Scene, settings: BakeSettings | None = None) -> Plan:
-    """Decide which effects the scene calls for under these settings.
+    """Decide which effects the scene calls for under these settings, for a bake to vertices.
 
     Returns the plan; nothing is traced, and the scene is not changed.
+    Raises SettingsError where settings name what is not in the scene.
     """
-    settings = settings or BakeSettings()
-    return Plan(
-        {
-            "occlusion": _occlusion(scene),
-            "instances": _instances(scene),
-            "max_distance": _max_distance(settings),
-            "falloff": _falloff(settings),
-            "backfaces": _backfaces(settings),
-            "ground": _ground(settings),
-        }
+    settings = _settled(scene, settings)
+    effects = {**occluder_effects(scene, settings), **_shared(scene, settings)}
+    return _explained({**effects, **vertex_effects(scene, settings)}, settings)
+
+
+def texture_plan(scene: Scene, settings: BakeSettings | None = None) -> Plan:
+    """The same for a bake to a texture."""
+    settings = _settled(scene, settings)
+    effects = {**occluder_effects(scene, settings), **_shared(scene, settings)}
+    effects["sharing"] = Effect(
+        False, "Texels of each placement lie elsewhere, and are all traced."
     )
+    return _explained({**effects, **texture_effects(scene, settings)}, settings)
 
 
-def _occlusion(scene: Scene) -> Effect:
-    if scene.triangles == 0:
-        return Effect(False, "There is no triangle in the scene.")
-    return Effect(True, f"{scene.triangles} triangles occlude each other.")
+def _settled(scene: Scene, settings: BakeSettings | None) -> BakeSettings:
+    from aobake.prepare import in_scene_units
+
+    return in_scene_units(scene, settings or BakeSettings())
 
 
-def _instances(scene: Scene) -> Effect:
-    counts = Counter(instance.mesh for instance in scene.instances)
-    shared = sorted(mesh for mesh, count in counts.items() if count > 1)
-    if not shared:
-        return Effect(False, "Every mesh stands in one place.")
-    name = scene.meshes[shared[0]].name or f"number {shared[0]}"
-    return Effect(
-        True, f"{len(shared)} meshes stand in several places, mesh {name!r} among them.", 1.2
-    )
+def _shared(scene: Scene, settings: BakeSettings) -> Mapping[str, Effect]:
+    return {**direction_effects(settings), "animation": animation(scene)}
 
 
-def _max_distance(settings: BakeSettings) -> Effect:
-    if settings.max_distance is None:
-        return Effect(False, "No max_distance was asked for.")
-    return Effect(True, f"max_distance is {settings.max_distance:g}.", 0.8)
-
-
-def _falloff(settings: BakeSettings) -> Effect:
-    if settings.falloff == "none":
-        return Effect(False, "Occlusion does not fade with distance, so any hit settles a ray.")
-    return Effect(True, f"falloff is {settings.falloff}, so the nearest hit is looked for.", 1.5)
-
-
-def _backfaces(settings: BakeSettings) -> Effect:
-    if settings.backfaces == "occlude":
-        return Effect(False, "Surfaces occlude from both sides, so no hit has to be examined.")
-    return Effect(True, "backfaces is ignore, so hits from behind are passed through.", 1.4)
-
-
-def _ground(settings: BakeSettings) -> Effect:
-    if settings.ground is None:
-        return Effect(False, "No ground was asked for.")
-    return Effect(True, f"A ground lies under the scene, {settings.ground} is up.")
+def _explained(effects: dict[str, Effect], settings: BakeSettings) -> Plan:
+    """The plan, in which effects that were switched by hand say so."""
+    for name in forced(settings.effect):
+        if name in effects:
+            words = f"{effects[name].reason} (Switched by hand.)"
+            effects[name] = replace(effects[name], reason=words, forced=True)
+    return Plan(effects)
