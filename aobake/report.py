@@ -15,10 +15,20 @@ from aobake import environment, files
 from aobake.errors import InputError
 from aobake.findings import Finding
 from aobake.plan import Plan
-from aobake.results import BakedVertices
-from aobake.settings import StoreSettings
+from aobake.results import BakedTexture, BakedVertices
+from aobake.settings import ImageSettings, StoreSettings
 
-__all__ = ["SCHEMA", "ErrorSummary", "FileRecord", "Report", "digests", "of_vertices"]
+__all__ = [
+    "SCHEMA",
+    "ErrorSummary",
+    "FileRecord",
+    "Report",
+    "ToleranceSummary",
+    "digests",
+    "of_bake",
+]
+
+Float32Array = NDArray[np.float32]
 
 SCHEMA = 1  # grows when a key changes its meaning or goes; new keys do not change it
 
@@ -37,8 +47,25 @@ class ErrorSummary:
 
     rms: float | None
     p50: float | None
+    p90: float | None
     p99: float | None
     max: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToleranceSummary:
+    """What came of a tolerance.
+
+    reached, missed : points whose standard error is, or is not, within it
+    rays_saved : against the fixed number of rays that gives the same root mean square error, by the law of
+        the standard error; negative where a fixed number would have done with fewer; None: not known
+    """
+
+    asked: float
+    of: str
+    reached: int
+    missed: int
+    rays_saved: int | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +75,8 @@ class Report:
     findings : what was passed over, mended or is in doubt; warnings : the same and more, for people
 
     settings : of the bake and of how it is stored; settings_file : the file that some came from
-    points : points that were given a value
+    layout : of a texture, one sentence for each image on where its texture coordinates come from
+    points : vertices or texels that were given a value
     ao_mean : their mean, or None where there are none
     seconds : stage -> seconds; rays : rays traced; mrays_per_s : million rays per second of tracing
     """
@@ -61,6 +89,7 @@ class Report:
     settings: Mapping[str, object]
     settings_file: str | None
     plan: Plan
+    layout: tuple[str, ...]
     instances: int
     triangles: int
     points: int
@@ -69,6 +98,7 @@ class Report:
     rays: int
     mrays_per_s: float | None
     error: ErrorSummary
+    tolerance: ToleranceSummary | None
     findings: tuple[Finding, ...]
     warnings: tuple[str, ...]
     versions: Mapping[str, str]
@@ -86,23 +116,23 @@ class Report:
         files.write_files({path: self.to_json().encode("utf-8", "backslashreplace")})
 
 
-def of_vertices(
-    baked: BakedVertices,
+def of_bake(
+    baked: BakedVertices | BakedTexture,
     *,
     command: str,
     inputs: Sequence[FileRecord],
     outputs: Sequence[FileRecord],
-    store: StoreSettings,
+    store: StoreSettings | ImageSettings,
     settings_file: Path | None = None,
     seconds: Mapping[str, float] | None = None,
     warnings: Sequence[str] = (),
 ) -> Report:
-    """The report of a vertex bake.
+    """The report of a bake.
 
     seconds : stages that the bake itself knows nothing of, such as 'read' and 'write'
     warnings : what to say besides the bake's own warnings and the scene's
     """
-    values = _joined(baked.ao)
+    values, errors = _values(baked)
     all_seconds = dict(baked.seconds) | dict(seconds or {})
     traced_s = all_seconds.get("trace", 0.0)
     here = environment.versions()
@@ -115,6 +145,7 @@ def of_vertices(
         settings=dataclasses.asdict(baked.settings) | dataclasses.asdict(store),
         settings_file=None if settings_file is None else str(settings_file),
         plan=baked.plan,
+        layout=baked.layout if isinstance(baked, BakedTexture) else (),
         instances=len(baked.scene.instances),
         triangles=baked.scene.triangles,
         points=len(values),
@@ -122,13 +153,22 @@ def of_vertices(
         seconds={stage: all_seconds[stage] for stage in _in_order(all_seconds)},
         rays=baked.rays,
         mrays_per_s=baked.rays / traced_s / 1e6 if traced_s > 0.0 else None,
-        error=error_summary(_joined(baked.standard_error)),
+        error=error_summary(errors),
+        tolerance=_tolerance_summary(baked, errors),
         findings=baked.findings,
         warnings=tuple(dict.fromkeys((*baked.scene.warnings, *baked.warnings, *warnings))),
         versions=here,
         machine=environment.machine(),
         processors=environment.processors(),
     )
+
+
+def _values(baked: BakedVertices | BakedTexture) -> tuple[Float32Array, Float32Array]:
+    """All values, and the standard errors of all that were traced: vertices, or covered texels."""
+    if isinstance(baked, BakedVertices):
+        return _joined(baked.ao), _joined(baked.standard_error)
+    shown = [image[on] for image, on in zip(baked.images, baked.coverages, strict=True)]
+    return _joined(shown), _joined([error.reshape(-1) for error in baked.standard_errors])
 
 
 def error_summary(standard_error: NDArray[np.float32]) -> ErrorSummary:
@@ -138,10 +178,29 @@ def error_summary(standard_error: NDArray[np.float32]) -> ErrorSummary:
     """
     traced = standard_error[standard_error > 0.0].astype(np.float64)
     if not len(traced):
-        return ErrorSummary(rms=None, p50=None, p99=None, max=None)
-    p50, p99 = np.percentile(traced, (50, 99))
+        return ErrorSummary(rms=None, p50=None, p90=None, p99=None, max=None)
+    p50, p90, p99 = (float(p) for p in np.percentile(traced, (50, 90, 99)))
     rms = float(np.sqrt(np.mean(traced**2)))
-    return ErrorSummary(rms=rms, p50=float(p50), p99=float(p99), max=float(traced.max()))
+    return ErrorSummary(rms=rms, p50=p50, p90=p90, p99=p99, max=float(traced.max()))
+
+
+def _tolerance_summary(
+    baked: BakedVertices | BakedTexture, standard_error: Float32Array
+) -> ToleranceSummary | None:
+    """None where no tolerance was asked for."""
+    settings = baked.settings
+    if settings.tolerance is None:
+        return None
+    traced = standard_error[standard_error > 0.0]
+    within = int((traced <= settings.tolerance * (1.0 + 1e-6)).sum())
+    fixed = baked.fixed_rays if isinstance(baked, BakedVertices) else None
+    return ToleranceSummary(
+        asked=settings.tolerance,
+        of=settings.tolerance_of,
+        reached=within,
+        missed=len(traced) - within,
+        rays_saved=None if fixed is None else fixed - baked.rays,
+    )
 
 
 def digests(paths: Sequence[Path]) -> tuple[FileRecord, ...]:
@@ -155,10 +214,12 @@ def digests(paths: Sequence[Path]) -> tuple[FileRecord, ...]:
     return tuple(records)
 
 
-def _joined(arrays: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
+def _joined(arrays: Sequence[Float32Array]) -> Float32Array:
     return np.concatenate(arrays) if arrays else np.empty(0, np.float32)
 
 
 def _in_order(seconds: Mapping[str, float]) -> list[str]:
-    known = ["read", "prepare", "build", "compile", "trace", "write"]
+    known = [
+        "read", "prepare", "unwrap", "build", "compile", "texels", "trace", "denoise", "finish", "write",
+    ]  # fmt: skip
     return [stage for stage in known if stage in seconds] + [s for s in seconds if s not in known]

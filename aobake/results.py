@@ -5,21 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.errors import OutputError
+from aobake.errors import InputError, OutputError
 from aobake.files import same_file
 from aobake.findings import Finding
 from aobake.meshes import formats
+from aobake.meshes.lightmap import Lightmap
 from aobake.meshes.scene import Scene
 from aobake.plan import Plan
-from aobake.settings import BakeSettings, StoreSettings
+from aobake.settings import BakeSettings, ImageSettings, StoreSettings
 
-__all__ = ["BakedVertices", "Estimate", "save"]
+__all__ = ["BakedTexture", "BakedVertices", "Estimate", "save"]
 
 Float32Array = NDArray[np.float32]
+ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,7 +45,11 @@ class BakedVertices:
 
     ao : one (V_i,) float32 array per instance, in the scene's order; 1 = open, 0 = fully occluded
     standard_error : the same shapes; 0 where nothing had to be estimated
+    bent_normals : one (V_i, 3) float32 array per instance, the mean open directions at unit length in the
+        space of its mesh, as its normals are; None where they were not asked for
     rays : rays spent on the whole scene
+    fixed_rays : those that the same number at every point would have taken for the same root mean square
+        error, by the law of the standard error; None where no tolerance was asked for
     seconds : stage -> seconds ("prepare", "build", "compile", "trace")
     findings : what was passed over, mended or is in doubt, counted and located
     warnings : the same, with what the reader had to say, one line each
@@ -54,27 +61,81 @@ class BakedVertices:
     ao: list[Float32Array]
     standard_error: list[Float32Array]
     rays: int
+    fixed_rays: int | None = None
+    seconds: Mapping[str, float]
+    findings: tuple[Finding, ...]
+    warnings: tuple[str, ...]
+    bent_normals: list[Float32Array] | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BakedTexture:
+    """Ambient occlusion in images that lie on the surfaces of a scene.
+
+    lightmap : the images, one or more, and where on them each instance lies
+    coverages : (H, W) bool of each image, the texels that surfaces lie on; the others are filled
+    standard_errors : (H, W) float32 of each image, as it was traced; 0 where nothing was estimated
+    layout : in one sentence for each image, where its texture coordinates come from
+    rays : rays spent on the whole scene
+    seconds : stage -> seconds ("prepare", "unwrap", "build", "compile", "texels", "trace", "denoise",
+        "finish")
+    findings, warnings : as those of BakedVertices
+    """
+
+    scene: Scene
+    settings: BakeSettings
+    plan: Plan
+    lightmap: Lightmap
+    coverages: tuple[NDArray[np.bool_], ...]
+    standard_errors: tuple[Float32Array, ...]
+    layout: tuple[str, ...]
+    rays: int
     seconds: Mapping[str, float]
     findings: tuple[Finding, ...]
     warnings: tuple[str, ...]
 
+    @property
+    def images(self) -> tuple[Float32Array, ...]:
+        """(H, W) float32 in [0, 1] each, row 0 at the top; 1 = open."""
+        return self.lightmap.pages
+
+    @property
+    def image(self) -> Float32Array:
+        """The one image. Raises InputError where there are several, or none."""
+        return self._one(self.images)
+
+    @property
+    def coverage(self) -> NDArray[np.bool_]:
+        """That of the one image. Raises InputError where there are several, or none."""
+        return self._one(self.coverages)
+
+    def _one(self, several: tuple[NDArray[ScalarT], ...]) -> NDArray[ScalarT]:
+        if len(several) != 1:
+            raise InputError(
+                f"there are {len(several)} images: take them from images and coverages, "
+                'or bake with atlas="scene" for a single one.'
+            )
+        return several[0]
+
 
 def save(
-    baked: BakedVertices,
+    baked: BakedVertices | BakedTexture,
     path: str | Path,
     *,
     store: StoreSettings | None = None,
+    image: ImageSettings | None = None,
     force: bool = False,
 ) -> tuple[Path, ...]:
     """Write the asset that was baked, with its ambient occlusion and nothing else changed.
 
-    path : a file of a format that can hold it (aobake.meshes.formats.WRITABLE); where it is the format
-        that the scene was read from, the source document is patched
+    path : a file of a format that can hold it (aobake.meshes.formats.WRITABLE for vertices,
+        TEXTURE_WRITABLE for textures), or an image of a texture alone; where it is the format that the
+        scene was read from, the source document is patched
+    store, image : how values at vertices, and how images, are kept
     force : allows the files that the scene was read from to be replaced
     Returns the files written, path first. Raises OutputError; a file appears whole or not at all.
     """
     target = Path(path)
-    store = store or StoreSettings()
     source = baked.scene.source
     if source is not None and not force:
         for read in source.files:
@@ -83,5 +144,11 @@ def save(
                     f"{target}: this is a file that the asset was read from. "
                     "Give another name, or allow it to be replaced (--force)."
                 )
-    formats.check_target(baked.scene, target, store)
-    return formats.write_vertex_ao(baked.scene, baked.ao, target, store)
+    if isinstance(baked, BakedTexture):
+        image = image or ImageSettings()
+        formats.check_texture_target(baked.scene, target, image, baked.lightmap)
+        return formats.write_texture_ao(baked.scene, baked.lightmap, target, image)
+    store = store or StoreSettings()
+    bent = baked.bent_normals
+    formats.check_target(baked.scene, target, store, bent_normals=bent is not None)
+    return formats.write_vertex_ao(baked.scene, baked.ao, target, store, bent)

@@ -224,6 +224,10 @@ NOTES = """
   theirs. With `--store occlusion` the values can be read as the attribute `_AO` as well. What
   KHR_node_visibility hides is left as it is. Draco and meshopt streams stay compressed; the new attributes
   stand beside them.
+- **Animations** of glTF: skinned and morphed meshes are baked in their rest pose. `--pose Walk@0.5` bakes the asset
+  as it stands half a second into the clip Walk (a name or a number; `aobake info` lists them with their length).
+  Only the occlusion is written back: the asset keeps its rest pose and its clips. Another format is written as
+  it stands in the pose. What KHR_animation_pointer moves is passed over, with a warning.
 - **USD** needs the extra `usd`. The result is a layer over the file that was read, and refers to it: keep both,
   in the same places relative to each other. Cages of subdivision surfaces and skinned meshes are baked as their
   points are authored, at the earliest time. Native instances that hold meshes are no longer shared in the

@@ -24,7 +24,9 @@ from numpy.typing import NDArray
 from scan import scan
 
 import aobake
-from aobake import bake
+from aobake.meshes.surfaces import surfaces_of
+from aobake.points import vertex_points
+from aobake.prepare import build
 from aobake.tracing import embree, kernels, origins
 from aobake.tracing.compiled import aligned, tight_kernel
 from aobake.tracing.contacts import note_triangle
@@ -61,8 +63,8 @@ class Bare:
 
     def __init__(self, scene: aobake.Scene, rays: int) -> None:
         settings = aobake.BakeSettings(rays=rays)
-        self.prepared = bake.build(scene, bake.surfaces_of(scene, settings), settings)
-        points = bake.vertex_points(scene, self.prepared)
+        self.prepared = build(scene, surfaces_of(scene, settings), settings)
+        points = vertex_points(scene, self.prepared)
         world = self.prepared.world
         self.origins = np.empty(points.positions.shape, np.float32)
         functions = embree.functions()

@@ -182,7 +182,7 @@ def chosen_settings(seed: int) -> BakeSettings:
     return BakeSettings(
         rays=int(rng.integers(1, 40)),
         tolerance=0.05 if rng.random() < 0.3 else None,
-        max_rays=int(rng.integers(1, 200)),
+        max_rays=int(rng.integers(32, 200)),
         max_distance=limit,
         falloff="none" if limit is None else ("none", "linear", "smooth")[int(rng.integers(3))],
         backfaces="ignore" if rng.random() < 0.3 else "occlude",

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from aobake import BakedVertices, BakeSettings, InputError, Scene, StoreSettings, plan
-from aobake.report import Report, digests, error_summary, of_vertices
+from aobake.report import Report, digests, error_summary, of_bake
 
 
 def baked(standard_error: list[float], *, seconds: float = 2.0) -> BakedVertices:
@@ -33,7 +33,7 @@ def baked(standard_error: list[float], *, seconds: float = 2.0) -> BakedVertices
 
 
 def reported(work: BakedVertices) -> Report:
-    return of_vertices(
+    return of_bake(
         work, command="vertex", inputs=(), outputs=(), store=StoreSettings(), warnings=("late.",)
     )
 
@@ -54,7 +54,7 @@ def test_the_rate_is_rays_over_the_seconds_of_tracing() -> None:
 
 
 def test_stages_come_in_the_order_in_which_they_happen() -> None:
-    done = of_vertices(
+    done = of_bake(
         baked([0.1]),
         command="vertex",
         inputs=(),

@@ -31,6 +31,11 @@ __all__ = ["COMMANDS", "Group", "Parameter", "Token", "build", "run"]
 
 COMMANDS = (
     "vertex",
+    "texture",
+    "render",
+    "view",
+    "study",
+    "plan",
     "info",
     "demo",
 )  # in the order of the help; each is a function in a file of its name

@@ -9,23 +9,25 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from aobake import BakeSettings, SettingsError, StoreSettings
+from aobake import BakeSettings, ImageSettings, SettingsError, StoreSettings
 from aobake.cli.options import as_flags, flag_name
 from aobake.errors import nearest
+from aobake.render_settings import RenderSettings
 
-__all__ = ["NAME", "Configured", "configured", "find", "read"]
+__all__ = ["NAME", "Configured", "configured", "find", "in_flags", "read", "rendering"]
 
 NAME = "aobake.toml"
 
-T = TypeVar("T", BakeSettings, StoreSettings)
+T = TypeVar("T", BakeSettings, StoreSettings, ImageSettings, RenderSettings)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Configured:
-    """bake, store : what applies; file : the aobake.toml that contributed, or None."""
+    """bake, store, image : what applies; file : the aobake.toml that contributed, or None."""
 
     bake: BakeSettings
     store: StoreSettings
+    image: ImageSettings
     file: Path | None
 
 
@@ -41,8 +43,14 @@ def configured(asset: Path | None, *flags: Mapping[str, object] | None) -> Confi
     return Configured(
         bake=_settings(BakeSettings, file, table, given),
         store=_settings(StoreSettings, file, table, given),
+        image=_settings(ImageSettings, file, table, given),
         file=file,
     )
+
+
+def rendering(flags: Mapping[str, object] | None) -> RenderSettings:
+    """The settings of a picture, from the flags that were given alone. Raises SettingsError."""
+    return _settings(RenderSettings, None, {}, flags or {})
 
 
 def find(asset: Path) -> Path | None:
@@ -62,7 +70,7 @@ def read(file: Path) -> dict[str, object]:
         raise SettingsError(f"{file}: it cannot be read ({error.strerror or error}).") from error
     except ValueError as error:  # not TOML, or not UTF-8
         raise SettingsError(f"{file}: this is no TOML ({error}).") from error
-    known = _fields(BakeSettings) | _fields(StoreSettings)
+    known = _fields(BakeSettings) | _fields(StoreSettings) | _fields(ImageSettings)
     for key in table:
         if key not in known:
             raise SettingsError(f'{file}: there is no setting "{key}".{nearest(key, known)}')
@@ -79,7 +87,7 @@ def _settings(
     except SettingsError as error:
         if file is not None and str(error) == _complaint(kind, ours):
             raise SettingsError(f"{file}: {error}") from error
-        raise SettingsError(_with_flag(str(error), kind)) from error
+        raise SettingsError(in_flags(str(error), kind)) from error
 
 
 def _made(kind: type[T], values: Mapping[str, object]) -> T:
@@ -95,7 +103,7 @@ def _complaint(kind: type[T], values: Mapping[str, object]) -> str:
     return ""
 
 
-def _with_flag(message: str, kind: type[T]) -> str:
+def in_flags(message: str, kind: type[T]) -> str:
     """The message in the words of the command line."""
     name, _, rest = message.partition(" ")
     return as_flags(f"{flag_name(name)} {rest}" if name in _fields(kind) else message, kind)

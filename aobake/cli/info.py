@@ -67,7 +67,7 @@ def about_asset(path: Path, source: SourceOptions) -> dict[str, Facts]:
     """What the document holds, what a bake would see of it, and what is wrong with it, under titles."""
     from aobake import load
 
-    scene = load(path, root=source.root, scene=source.scene)
+    scene = load(path, root=source.root, scene=source.scene, pose=source.pose)
     document = scene.source
     facts: Facts = {} if document is None else {"format": document.format, **document.facts()}
     problems = {str(number): text for number, text in enumerate(scene.warnings, 1)}

@@ -7,27 +7,38 @@ import dataclasses
 import inspect
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias, TypedDict, get_args, get_type_hints
 
 from aobake.cli.app import Group, Parameter, Token
-from aobake.settings import BakeSettings, StoreSettings
+from aobake.render_settings import RenderSettings
+from aobake.settings import (
+    AtlasSettings,
+    ImageSettings,
+    StoreSettings,
+    TraceSettings,
+    VertexSettings,
+)
 
 __all__ = [
-    "BakeFlags",
+    "AtlasFlags",
     "CommonOptions",
+    "ImageFlags",
     "Output",
+    "RenderFlags",
     "SourceOptions",
     "StoreFlags",
+    "TraceFlags",
+    "VertexFlags",
     "as_flags",
     "flag_name",
 ]
 
-COMMON = Group("Common options", sort_key=4)
-SOURCE = Group("Reading", sort_key=3)
+COMMON = Group("Common options", sort_key=5)
+SOURCE = Group("Reading", sort_key=4)
 
 Output = Annotated[Path, Parameter(alias="-o", group=Group("Writing", sort_key=1))]
 
@@ -57,6 +68,9 @@ class SourceOptions:
 
     scene: str | None = None
     """Name or number of the glTF scene to take. Left out: the one that the file shows by default."""
+
+    pose: str | None = None
+    """Moment of a glTF animation to take, as CLIP@SECONDS, such as Walk@0.5. Left out: the rest pose."""
 
     root: Path | None = None
     """Folder that the asset's side files may lie in. Left out: the asset's own folder."""
@@ -100,6 +114,17 @@ def _whole(_hint: object, tokens: Sequence[Token]) -> int | None:
     return None if word.lower() in {"none", "null"} else int(word)
 
 
+def _number(_hint: object, tokens: Sequence[Token]) -> float | str | None:
+    """A number, or what else the settings understand: rms:0.01, 5%."""
+    word = tokens[0].value
+    if word.lower() in {"none", "null"}:
+        return None
+    try:
+        return float(word)
+    except ValueError:
+        return word
+
+
 def _flags(settings: type, title: str, order: int) -> object:
     """A TypedDict of the settings' fields: cyclopts fills in those that were given, and no others."""
     helps = field_help(settings)
@@ -107,19 +132,33 @@ def _flags(settings: type, title: str, order: int) -> object:
     hints, types = {}, get_type_hints(settings)
     for field in dataclasses.fields(settings):
         text = as_flags(helps.get(field.name, ""), settings)
-        if field.default is not None:
-            text += f" [default: {field.default}]"
+        if field.default not in {None, ()}:
+            words = field.default if isinstance(field.default, tuple) else [str(field.default)]
+            text += f" [default: {' '.join(words)}]"
         hint = types[field.name]
-        whole = _whole if hint is int or int in get_args(hint) else None
-        parameter = Parameter(name=flag_name(field.name), group=group, help=text, converter=whole)
+        read: Callable[[object, Sequence[Token]], object] | None = None
+        if hint is int or int in get_args(hint):
+            read = _whole
+        elif field.name in {"tolerance", "max_distance"}:
+            read = _number
+        parameter = Parameter(name=flag_name(field.name), group=group, help=text, converter=read)
         hints[field.name] = Annotated[hint, parameter]
     flags = TypedDict(settings.__name__, hints, total=False)  # type: ignore[misc]
     return Annotated[flags | None, Parameter(name="*")]
 
 
 if TYPE_CHECKING:
-    BakeFlags: TypeAlias = Mapping[str, object] | None
-    StoreFlags: TypeAlias = Mapping[str, object] | None
+    Flags: TypeAlias = Mapping[str, object] | None
+    TraceFlags: TypeAlias = Flags
+    VertexFlags: TypeAlias = Flags
+    AtlasFlags: TypeAlias = Flags
+    StoreFlags: TypeAlias = Flags
+    ImageFlags: TypeAlias = Flags
+    RenderFlags: TypeAlias = Flags
 else:
-    BakeFlags = _flags(BakeSettings, "Baking", 2)
+    TraceFlags = _flags(TraceSettings, "Baking", 2)
+    VertexFlags = _flags(VertexSettings, "Baking", 2)
+    AtlasFlags = _flags(AtlasSettings, "Texture", 3)
     StoreFlags = _flags(StoreSettings, "Writing", 1)
+    ImageFlags = _flags(ImageSettings, "Writing", 1)
+    RenderFlags = _flags(RenderSettings, "Picture", 2)

@@ -26,15 +26,19 @@ def check_target(path: Path, *, force: bool, inputs: Sequence[Path] = ()) -> Non
     check_writable(path)
 
 
-def check_asset_target(path: Path, *, force: bool, inputs: Sequence[Path] = ()) -> None:
-    """The same for an asset, whose format must be able to hold ambient occlusion."""
-    from aobake.meshes.formats import WRITABLE
+def check_asset_target(
+    path: Path, formats: Sequence[str], what: str, *, force: bool, inputs: Sequence[Path] = ()
+) -> None:
+    """The same for an asset whose format must be one of several.
 
+    formats : the endings of those that can hold what is written; what : a name for it
+    """
     suffix = path.suffix.lower()
-    if suffix not in WRITABLE:
+    if suffix not in formats:
+        of = f" of {inputs[0].name}" if inputs else ""
         raise SettingsError(
-            f"{path}: {suffix or 'a name without an ending'} cannot hold ambient occlusion."
-            f"{nearest(suffix, WRITABLE)}"
+            f"{path}: {suffix or 'a name without an ending'} cannot hold {what}{of}."
+            f"{nearest(suffix, formats)}"
         )
     check_target(path, force=force, inputs=inputs)
 

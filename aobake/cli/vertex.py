@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 from aobake.cli.config import configured
-from aobake.cli.leaving import leaving_promptly
-from aobake.cli.options import BakeFlags, CommonOptions, Output, SourceOptions, StoreFlags
+from aobake.cli.options import (
+    CommonOptions,
+    Output,
+    SourceOptions,
+    StoreFlags,
+    TraceFlags,
+    VertexFlags,
+)
 from aobake.cli.output import check_asset_target, check_target
 
 __all__ = ["vertex"]
@@ -19,7 +24,8 @@ def vertex(
     *,
     output: Output,
     store: StoreFlags = None,
-    bake: BakeFlags = None,
+    vertices: VertexFlags = None,
+    trace: TraceFlags = None,
     source: SourceOptions = SourceOptions(),  # noqa: B008 - frozen
     common: CommonOptions = CommonOptions(),  # noqa: B008 - frozen
 ) -> int:
@@ -39,31 +45,15 @@ def vertex(
     output:
         The file to write; its ending chooses the format.
     """
-    chosen = configured(input, bake, store)
-    check_asset_target(output, force=common.force, inputs=[input])
+    from aobake.meshes.formats import WRITABLE
+
+    chosen = configured(input, trace, vertices, store)
+    check_asset_target(output, WRITABLE, "ambient occlusion", force=common.force, inputs=[input])
     if common.report is not None:
         check_target(common.report, force=common.force)
 
-    from aobake import load
-    from aobake.cli.work import Work, bake_vertices_to
-    from aobake.meshes.formats import check_target as check_format
+    from aobake.cli.work import Work, bake_vertices_to, opened
 
-    started = time.perf_counter()
-    with leaving_promptly():
-        scene = load(input, root=source.root, scene=source.scene)
-    seconds = {"read": time.perf_counter() - started}
-    warnings = check_format(scene, output, chosen.store)
-    read = scene.source.files if scene.source else ()
-    bake_vertices_to(
-        scene,
-        Work(
-            command="vertex",
-            output=output,
-            chosen=chosen,
-            common=common,
-            inputs=read,
-            seconds=seconds,
-            warnings=warnings,
-        ),
-    )
+    work = Work(command="vertex", output=output, chosen=chosen, common=common)
+    bake_vertices_to(opened(input, source, work), work)
     return 0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aobake.demo.patches import Patch, joined, rounded_path
-from aobake.demo.shapes import Flutes, apse, arched_wall, ball, stone, surround, turned
+from aobake.demo.shapes import Flutes, apse, arched_wall, ball, frame, stone, surround, turned
 from aobake.meshes.scene import FloatArray, Instance, Material, Mesh, Scene
 
 __all__ = ["hall"]
@@ -81,7 +81,9 @@ def _ground() -> list[Part]:
         tuple(Place(x, -0.08, z) for x, z in middles if (x + z) % 2 == odd) for odd in (0, 1)
     )
     bed = stone((8.0, 0.48, 6.6), 0.02, 0.16, bedded=True)
-    ground = surround((4.0005, 3.9), 6.1, 0.25, 0.16)
+    border = (4.0005, 3.9)
+    ground = surround(border, 6.1, 0.25, 0.16)
+    footing = frame(border, 0.1)  # or one would look through the joint
     steps = []
     for number, name in enumerate(("upper step", "middle step", "lower step")):
         height = 0.22 * (3 - number)
@@ -94,6 +96,7 @@ def _ground() -> list[Part]:
         Part("bed", "limestone", bed, (Place(0.0, -0.42 + MORTAR, -0.3),)),
         *steps,
         Part("ground", "sand", ground, (Place(0.0, GROUND_Y, 0.2995),)),
+        Part("footing", "sand", footing, (Place(0.0, GROUND_Y - 0.02, 0.2995),)),
     ]
 
 

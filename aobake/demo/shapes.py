@@ -9,7 +9,7 @@ import numpy as np
 from aobake.demo.patches import Patch, grid, joined
 from aobake.meshes.scene import FloatArray
 
-__all__ = ["Flutes", "apse", "arched_wall", "ball", "stone", "surround", "turned"]
+__all__ = ["Flutes", "apse", "arched_wall", "ball", "frame", "stone", "surround", "turned"]
 
 
 @dataclass(frozen=True)
@@ -136,6 +136,15 @@ def surround(half: tuple[float, float], radius: float, rim: float, step: float) 
     points[3:, :, [0, 2]] = (1 - t) * inner + t * direction * (radius - rim / 4)
     points[:3, :, [0, 2]] = radius * direction
     points[:3, :, 1] = np.array([[-rim], [-rim / 2], [-rim / 4]])
+    return grid(points, closed=True)
+
+
+def frame(half: tuple[float, float], width: float) -> Patch:
+    """A flat strip, facing up, along the border of a rectangle: half of its width on either side."""
+    corners = np.array([(1, -1), (-1, -1), (-1, 1), (1, 1), (1, -1)], np.float64)
+    points = np.zeros((2, len(corners), 3))
+    for row, beyond in enumerate((width / 2, -width / 2)):
+        points[row][:, [0, 2]] = corners * (np.array(half) + beyond)
     return grid(points, closed=True)
 
 

@@ -8,17 +8,23 @@ from pathlib import Path
 import pytest
 
 import aobake
+from aobake import images
 from tests.conftest import Run
 from tests.support import one_line
 
 
 def test_the_demo_writes_an_asset_and_its_report(run: Run, tmp_path: Path) -> None:
     folder = tmp_path / "new" / "demo"
-    ran = run("demo", "-o", folder, "--rays", 4)
+    ran = run("demo", "-o", folder, "--rays", 4, "--size", 256, "--denoise", "off")
     assert ran.status == 0, ran.err
     assert ran.err == ""
-    assert sorted(p.name for p in folder.iterdir()) == ["hall.glb", "report.json"]
-    assert str(folder / "hall.glb") in ran.out
+    written = ["hall.glb", "hall.html", "hall.png", "hall_lightmap.glb", "report.json"]
+    assert sorted(p.name for p in folder.iterdir()) == written
+    assert str(folder / "hall.html") in ran.out
+    assert images.decode((folder / "hall.png").read_bytes(), "hall.png").std() > 0.05
+    assert b"<title>The hall" in (folder / "hall.html").read_bytes()
+    lightmap = aobake.load(folder / "hall_lightmap.glb")
+    assert all(material.occlusion_texture for material in lightmap.materials)
     scene = aobake.load(folder / "hall.glb")
     data = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     assert data["triangles"] == scene.triangles

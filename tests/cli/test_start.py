@@ -8,8 +8,14 @@ import re
 import pytest
 
 import aobake
-from aobake import BakeSettings, StoreSettings
 from aobake.cli.app import COMMANDS
+from aobake.settings import (
+    AtlasSettings,
+    ImageSettings,
+    StoreSettings,
+    TraceSettings,
+    VertexSettings,
+)
 from tests.conftest import Run
 from tests.support import modules_after, python
 
@@ -36,19 +42,30 @@ def test_every_command_is_in_the_help_with_what_it_does(run: Run) -> None:
         assert re.search(rf"\b{command}\s+[A-Z]\w+ ", ran.out), command
 
 
-@pytest.mark.parametrize("kind", [BakeSettings, StoreSettings])
+@pytest.mark.parametrize(
+    ("command", "kind"),
+    [
+        ("vertex", TraceSettings),
+        ("vertex", VertexSettings),
+        ("vertex", StoreSettings),
+        ("texture", TraceSettings),
+        ("texture", AtlasSettings),
+        ("texture", ImageSettings),
+    ],
+)
 def test_the_help_shows_every_setting_with_its_default(
-    run: Run, kind: type[BakeSettings | StoreSettings], monkeypatch: pytest.MonkeyPatch
+    run: Run, command: str, kind: type, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "400")
-    text = run("vertex", "--help").out
+    text = run(command, "--help").out
     for field in dataclasses.fields(kind):
         line = next(
             part for part in text.split("\n") if f"--{field.name.replace('_', '-')} " in part
         )
         assert len(line.split()) > 4, "a flag explains itself"
-        if field.default is not None:
-            assert f"[default: {field.default}]" in line
+        if field.default not in {None, ()}:
+            several = field.default if isinstance(field.default, tuple) else (field.default,)
+            assert f"[default: {' '.join(map(str, several))}]" in line
         assert "None" not in line
 
 
