@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,6 +17,7 @@ from aobake.render_settings import RenderSettings
 __all__ = ["NAME", "Configured", "configured", "find", "in_flags", "read", "rendering"]
 
 NAME = "aobake.toml"
+RENDER = "render"
 
 T = TypeVar("T", BakeSettings, StoreSettings, ImageSettings, RenderSettings)
 
@@ -48,9 +49,15 @@ def configured(asset: Path | None, *flags: Mapping[str, object] | None) -> Confi
     )
 
 
-def rendering(flags: Mapping[str, object] | None) -> RenderSettings:
-    """The settings of a picture, from the flags that were given alone. Raises SettingsError."""
-    return _settings(RenderSettings, None, {}, flags or {})
+def rendering(asset: Path, flags: Mapping[str, object] | None) -> RenderSettings:
+    """The settings of a picture of an asset, from the table [render] and the flags that were given.
+
+    They have a table of their own, since a picture and a lightmap both have a size.
+    Raises SettingsError, which names the file or the flag.
+    """
+    file = find(asset)
+    table = {} if file is None else read(file).get(RENDER, {})
+    return _settings(RenderSettings, file, table, flags or {})
 
 
 def find(asset: Path) -> Path | None:
@@ -62,8 +69,8 @@ def find(asset: Path) -> Path | None:
     return None
 
 
-def read(file: Path) -> dict[str, object]:
-    """The table in an aobake.toml. Raises SettingsError for a key that is no setting."""
+def read(file: Path) -> dict[str, Any]:
+    """The tables in an aobake.toml. Raises SettingsError for a key that is no setting."""
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
@@ -71,10 +78,20 @@ def read(file: Path) -> dict[str, object]:
     except ValueError as error:  # not TOML, or not UTF-8
         raise SettingsError(f"{file}: this is no TOML ({error}).") from error
     known = _fields(BakeSettings) | _fields(StoreSettings) | _fields(ImageSettings)
+    pictures = table.get(RENDER, {})
+    if not isinstance(pictures, dict):
+        raise SettingsError(f"{file}: {RENDER} is {pictures!r}; a table [{RENDER}] is needed.")
+    _refuse_unknown(file, "", table, known | {RENDER})
+    _refuse_unknown(file, f" in [{RENDER}]", pictures, _fields(RenderSettings))
+    return table
+
+
+def _refuse_unknown(
+    file: Path, where: str, table: Mapping[str, object], known: Collection[str]
+) -> None:
     for key in table:
         if key not in known:
-            raise SettingsError(f'{file}: there is no setting "{key}".{nearest(key, known)}')
-    return table
+            raise SettingsError(f'{file}: there is no setting "{key}"{where}.{nearest(key, known)}')
 
 
 def _settings(

@@ -15,7 +15,7 @@ from aobake.cli.config import configured, in_flags, rendering
 from aobake.cli.leaving import leaving_promptly
 from aobake.cli.options import CommonOptions, Output, RenderFlags, SourceOptions, TraceFlags
 from aobake.cli.output import check_target
-from aobake.errors import SettingsError, nearest
+from aobake.errors import InputError, SettingsError, nearest
 from aobake.render_settings import RenderSettings
 from aobake.settings import Encoding
 
@@ -31,12 +31,16 @@ WRITING = Group("Writing", sort_key=1)
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class _Wanted:
-    """What is to be drawn: one picture, or a comparison."""
+    """What is to be drawn: one picture, or a comparison.
+
+    settings_file : the aobake.toml that some of it came from
+    """
 
     picture: RenderSettings
     bake: BakeSettings
     compare: str | None
     encoding: Encoding | None
+    settings_file: Path | None
 
 
 def render(
@@ -72,7 +76,11 @@ def render(
     """
     chosen = configured(input, trace)
     wanted = _Wanted(
-        picture=rendering(picture), bake=chosen.bake, compare=compare, encoding=encoding
+        picture=rendering(input, picture),
+        bake=chosen.bake,
+        compare=compare,
+        encoding=encoding,
+        settings_file=chosen.file,
     )
     _check(wanted, output)
     check_target(output, force=common.force, inputs=[input])
@@ -89,7 +97,10 @@ def render(
         inputs = report.digests(read)
         seconds = {"read": time.perf_counter() - started}
         with terminal.progress_bar(quiet=common.quiet) as progress:
-            drawn, content = _drawn(scene, wanted, output.suffix.lower(), progress)
+            try:
+                drawn, content = _drawn(scene, wanted, output.suffix.lower(), progress)
+            except InputError as error:
+                raise InputError(_about(input, str(error))) from error
     started = time.perf_counter()
     write_files({output: content})
     seconds |= {**drawn.seconds, "write": time.perf_counter() - started}
@@ -99,9 +110,14 @@ def render(
     if not common.quiet:
         height, width = drawn.pixels.shape[:2]
         terminal.say(f"{output}: {width} x {height} pixels in {sum(seconds.values()):.2f} s")
-        terminal.say(*_occlusion(drawn))
+        terminal.say(*_occlusion(drawn, wanted))
         terminal.warn(drawn.warnings, "; --report FILE keeps them all")
     return 0
+
+
+def _about(asset: Path, message: str) -> str:
+    """The message in the words of the command line, with the file that it is about in front."""
+    return message if str(asset) in message else f"{asset}: {in_flags(message, RenderSettings)}"
 
 
 def _check(wanted: _Wanted, output: Path) -> None:
@@ -148,14 +164,16 @@ def _drawn(
     return sheet, encoded_sheet(sheet.pixels, suffix, wanted.encoding)
 
 
-def _occlusion(drawn: Preview | Comparison) -> Sequence[str]:
+def _occlusion(drawn: Preview | Comparison, wanted: _Wanted) -> Sequence[str]:
     """Where the ambient occlusion of a picture is from: what is baked and what is colour look alike."""
     shown = drawn.effects.get("ambient_occlusion")
-    return (
-        []
-        if shown is None or isinstance(shown, Mapping)
-        else [f"ambient occlusion: {shown.reason}"]
-    )
+    if (
+        shown is None
+        or isinstance(shown, Mapping)
+        or wanted.picture.channel not in {"beauty", "ao"}
+    ):
+        return []
+    return [f"ambient occlusion: {shown.reason}"]
 
 
 def _report(
@@ -173,6 +191,7 @@ def _report(
         "command": "render",
         **{kind: [vars(record) for record in records] for kind, records in files.items()},
         "settings": settings | {"compare": wanted.compare, "encoding": wanted.encoding},
+        "settings_file": None if wanted.settings_file is None else str(wanted.settings_file),
         "plan": {"effects": _plain(drawn.effects)},
         "seconds": {stage: round(spent, 6) for stage, spent in seconds.items()},
         "warnings": list(drawn.warnings),

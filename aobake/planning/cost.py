@@ -25,8 +25,10 @@ __all__ = ["Cost", "EffectCost", "estimated"]
 PROBE_SECONDS = 0.25  # that the last, and longest, probe may take
 FIRST_PROBE, LONGER = 64, 4  # points
 RUN = 16  # points next to each other that are probed together: neighbours meet the same triangles
-# Memory, measured by benchmarks/effects.py: the tree and the faces, and what is kept for each vertex.
-TRIANGLE_BYTES, VERTEX_BYTES = 220, 260
+# Memory: a scan of 400,000 faces takes 270 bytes for each more than nothing does, half a vertex included.
+TRIANGLE_BYTES, VERTEX_BYTES = 160, 220
+# Of bent normals at a point: sums in float64, the result in float32. Of a face with holes: where it lies in them.
+BENT_BYTES, HOLED_BYTES = 36, 36
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +101,7 @@ def estimated(
         points=scene.vertices if texels is None else texels,
         rays=round(rays * traced),
         bytes=size,
-        effects=_of_effects(decided, seconds["trace"]),
+        effects=_of_effects(decided, seconds["trace"], _extra_bytes(scene, decided)),
     )
 
 
@@ -132,10 +134,24 @@ def _in_runs(count: int, wanted: int) -> np.ndarray[tuple[int], np.dtype[np.int6
     return np.unique(np.maximum(starts[:, None], 0) + np.arange(min(RUN, count)))
 
 
-def _of_effects(decided: Plan, traced: float) -> dict[str, EffectCost]:
+def _extra_bytes(scene: Scene, decided: Plan) -> dict[str, int]:
+    """Memory that effects take beside what every bake takes; those that are not named take none."""
+    found = {"bent_normals": BENT_BYTES * scene.vertices}
+    if decided.effects["alpha"].on:
+        from aobake.meshes.alpha import scene_alpha
+
+        holed = scene_alpha(scene).meshes.values()
+        images = {id(alpha.alpha): alpha.alpha.nbytes for alpha in holed}
+        found["alpha"] = sum(images.values()) + sum(HOLED_BYTES * len(a.kinds) for a in holed)
+    return found
+
+
+def _of_effects(decided: Plan, traced: float, extra: Mapping[str, int]) -> dict[str, EffectCost]:
     """What each effect adds to the seconds of tracing, or would add, by its factor."""
     found = {}
     for name, effect in decided.effects.items():
         without = traced / effect.cost if effect.on and effect.cost > 0.0 else traced
-        found[name] = EffectCost(factor=effect.cost, seconds=without * (effect.cost - 1.0), bytes=0)
+        found[name] = EffectCost(
+            factor=effect.cost, seconds=without * (effect.cost - 1.0), bytes=extra.get(name, 0)
+        )
     return found

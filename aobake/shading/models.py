@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
@@ -82,6 +82,14 @@ def model(name: str) -> Model:
     return MODELS[name]
 
 
+def _who_has(name: str, own: Collection[str]) -> str:
+    """Where a parameter belongs that a model does not have, or what the model has instead."""
+    others = [m.name for m in MODELS.values() if name in {each.name for each in m.parameters}]
+    if others:
+        return f" Models with it: {', '.join(others)}."
+    return nearest(name, own) if own else " It has none."
+
+
 def evaluate(
     chosen: Model,
     normal: ArrayLike,
@@ -98,6 +106,5 @@ def evaluate(
     own = {each.name for each in chosen.parameters}
     for name in given:
         if name not in own:
-            hint = nearest(name, own) if own else " It has none."
-            raise SettingsError(f"{chosen.name} has no parameter {name!r}.{hint}")
+            raise SettingsError(f"{name} is no parameter of {chosen.name}.{_who_has(name, own)}")
     return chosen.function(normal, light, view, **given)

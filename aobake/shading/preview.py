@@ -145,14 +145,17 @@ def _refuse_empty_channel(look: Look, settings: RenderSettings) -> None:
     if settings.channel == "error" and (look.baked is None or look.baked.standard_error is None):
         raise InputError(
             "channel is 'error', but files do not hold the error of a bake. "
-            "Bake for the picture (ao bake), or pass one."
+            "Leave ao at auto to bake for the picture."
         )
     if settings.channel == "bent-normal" and not look.has_bent_normals:
-        raise InputError("channel is 'bent-normal', but the asset has no attribute _BENT_NORMAL.")
+        raise InputError(
+            "channel is 'bent-normal', but the asset has no attribute _BENT_NORMAL. "
+            "Bake it with bent normals first."
+        )
     if settings.channel == "ao" and all(source == "none" for source in look.occlusion):
         raise InputError(
             "channel is 'ao', but the asset holds no ambient occlusion. "
-            "Bake for the picture (ao bake), or pass one."
+            "Leave ao at auto to bake for the picture."
         )
 
 

@@ -15,7 +15,7 @@ from aobake.meshes.scene import Scene
 from aobake.meshes.surfaces import surfaces_of
 from aobake.occlusion import occlusion_at
 from aobake.points import SurfacePoints, points_on_faces, vertex_points
-from aobake.prepare import Prepared, build, lowest
+from aobake.prepare import Prepared, build, in_scene_units, lowest
 from aobake.settings import BakeSettings
 from aobake.tracing.estimate import Estimates, Request, estimate
 
@@ -86,6 +86,7 @@ class Bench:
 
 def bench_of(scene: Scene, settings: BakeSettings, most: int) -> Bench:
     """An asset with at most so many of its vertices, spread evenly over their numbers."""
+    settings = in_scene_units(scene, settings)
     prepared = build(scene, surfaces_of(scene, settings), settings)
     points = vertex_points(scene, prepared)
     step = max(1, -(-len(points) // most))

@@ -167,9 +167,10 @@ def _refuse_if_long(bench: Bench, extent: Extent, time_limit: float | None) -> N
     rate = len(some.points) * WARMING_RAYS / max(time.perf_counter() - start, 1e-6)
     expected = extent.rays(bench.whole) / rate
     if time_limit is not None and expected > time_limit:
+        cure = ", or make a quick study" if extent.reference > QUICK.reference else ""
         raise SettingsError(
             f"the study would take about {expected:.0f} s on this machine, and the time limit is "
-            f"{time_limit:g} s. Raise the limit, or make a quick study."
+            f"{time_limit:g} s. Raise the time limit{cure}."
         )
 
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.study.curves import Curve, Study, needed, pareto
+from aobake.study.curves import Curve, Level, Study, needed, pareto
 from aobake.study.pictures import LevelPictures
 from aobake.study.plots import picture_png
 
@@ -20,7 +20,7 @@ body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; marg
 h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .15rem .8rem .15rem 0; text-align: right; border-bottom: 1px solid #eee; }
-th:first-child, td:first-child { text-align: left; }
+th:first-child, td:first-child, .facts td { text-align: left; }
 svg { max-width: 100%; height: auto; } figure { display: inline-block; margin: .3rem; }
 figcaption { font-size: .85rem; color: #555; } .lead { font-size: 1.1rem; }
 """
@@ -101,13 +101,18 @@ def _table(curves: Sequence[Curve]) -> str:
         "<th>within 2 SE</th><th>front</th></tr>"
     ]
     rows += [
-        f"<tr><td>{curve.name} {level.setting}</td><td>{level.rays:.0f}</td><td>{level.seconds:.2f}</td>"
+        f"<tr><td>{_said(curve, level)}</td><td>{level.rays:.0f}</td><td>{level.seconds:.2f}</td>"
         f"<td>{level.rmse:.5f}</td><td>{level.p99:.4f}</td><td>{level.max:.4f}</td>"
         f"<td>{level.within_2:.1%}</td><td>{'yes' if (curve.name, level.setting) in front else ''}</td></tr>"
         for curve in curves
         for level in curve.levels
     ]
     return "<table>" + "\n".join(rows) + "</table>"
+
+
+def _said(curve: Curve, level: Level) -> str:
+    """What was asked for; a tolerance says its form by itself."""
+    return f"{curve.kind if curve.kind == 'tolerance' else curve.name} {level.setting}"
 
 
 def _methods(study: Study, drawings: Mapping[str, bytes]) -> str:
@@ -144,9 +149,16 @@ def _facts(study: Study) -> str:
         (v.seconds_most / v.seconds_least for v in study.fixed.levels if v.seconds_least > 0.0),
         default=1.0,
     )
-    facts = {**study.facts, "spread of times, most over least": f"{spread:.2f}"}
+    facts = {**study.facts, "spread of times, most over least": spread}
     rows = "".join(
-        f"<tr><td>{html.escape(str(k))}</td><td>{html.escape(str(v))}</td></tr>"
-        for k, v in facts.items()
+        f"<tr><td>{html.escape(name)}</td><td>{html.escape(_plain(fact))}</td></tr>"
+        for name, fact in facts.items()
     )
-    return f"<h2>Where it was measured</h2>\n<table>{rows}</table>"
+    return f'<h2>Where it was measured</h2>\n<table class="facts">{rows}</table>'
+
+
+def _plain(fact: object) -> str:
+    """A fact as people write it."""
+    if isinstance(fact, Mapping):
+        return ", ".join(f"{name} {value}" for name, value in fact.items())
+    return f"{fact:.2f}" if isinstance(fact, float) else str(fact)

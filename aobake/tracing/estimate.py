@@ -1,7 +1,7 @@
 """Estimates and their errors: blocks of points over threads, a fixed number of rays or rounds of them.
 
 The value at a point depends on its number and the seed, not on blocks and threads. With a tolerance the
-sets of directions double in rounds where that is still needed (rounds.py).
+sets of directions grow in rounds where that is still needed (rounds.py).
 """
 
 from __future__ import annotations

@@ -127,11 +127,11 @@ class _Outlook:
 
     def variance(self, doublings: int) -> FloatArray:
         """(P,) the squared standard error after so many doublings."""
-        return _variance(self.spread, self.boundary, self.rays * 2.0**doublings)
+        return _variance(self.spread, self.boundary, self.rays << doublings)
 
     def worth(self, doublings: int) -> FloatArray:
         """(P,) about what one more doubling takes away from that, for each of its rays."""
-        return self.variance(doublings) / (self.rays * 2.0**doublings)
+        return np.asarray(self.variance(doublings) / (self.rays << doublings))
 
 
 def _price(outlook: _Outlook, room: IntArray, tolerance: float) -> float:

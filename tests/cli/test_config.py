@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from aobake import SettingsError
-from aobake.cli.config import configured
+from aobake.cli.config import configured, rendering
 from tests.conftest import Run
 from tests.support import one_line
 
@@ -64,6 +64,8 @@ def test_what_is_in_no_file_has_no_aobake_toml(
         ("falloff = ['linear']\n", ["falloff"]),
         ("[bake]\nrays = 4\n", ['"bake"']),
         ("rays = \n", ["no TOML"]),
+        ("render = 3\n", ["render is 3", "[render]"]),
+        ("[render]\nmodle = 'phong'\n", ['"modle" in [render]', 'Did you mean "model"']),
     ],
 )
 def test_a_mistake_in_the_file_names_the_file(
@@ -74,6 +76,17 @@ def test_a_mistake_in_the_file_names_the_file(
     assert ran.status == 2
     assert one_line(ran.err, "aobake.toml", *parts), ran.err
     assert not (tmp_path / "out.obj").exists()
+
+
+def test_pictures_have_a_table_of_their_own(tmp_path: Path) -> None:
+    asset = tmp_path / "a.glb"
+    write(tmp_path, 'size = 512\n[render]\nsize = "64x48"\nmodel = "phong"\n')
+    assert configured(asset).bake.size == 512
+    chosen = rendering(asset, {"model": "minnaert"})
+    assert (chosen.size, chosen.model) == ("64x48", "minnaert")
+    write(tmp_path, '[render]\nsize = "64"\n')
+    with pytest.raises(SettingsError, match=r"aobake\.toml: size is '64'"):
+        rendering(asset, {})
 
 
 def test_a_mistake_in_a_flag_is_not_blamed_on_the_file(tmp_path: Path) -> None:

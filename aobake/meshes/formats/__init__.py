@@ -248,7 +248,7 @@ def write_texture_ao(
 
 
 def _check_lightmap(scene: Scene, lightmap: Lightmap) -> None:
-    """Raise OutputError where a lightmap is not one of this scene."""
+    """Raise OutputError where a lightmap is empty, or not one of this scene."""
     if len(lightmap.placings) != len(scene.instances):
         raise OutputError(
             f"the lightmap places {len(lightmap.placings)} instances, and the scene has "
@@ -260,6 +260,11 @@ def _check_lightmap(scene: Scene, lightmap: Lightmap) -> None:
                 f"instance {instance.name!r} is on image {placing.page} of the lightmap, which has "
                 f"{len(lightmap.pages)}."
             )
+    if not lightmap.pages:
+        file = f"{scene.source.path}: " if scene.source else ""
+        raise OutputError(
+            f"{file}no triangle has an area, so there is no lightmap. Scale or repair the asset."
+        )
 
 
 def _texture_writer(scene: Scene, target: Path) -> TextureWriter:

@@ -66,7 +66,9 @@ def materials_touched(source: GltfSource, places: Mapping[Key, Place]) -> list[s
         material = document.entry("materials", number)
         label = document.label("materials", number)
         if "occlusionTexture" in material and not _is_ours(document, material):
-            found.append(f"{name}: {label} has an occlusion texture, which is replaced")
+            found.append(
+                f"{name}: {label} has an occlusion texture, which gives way to the new one"
+            )
         if material.extension(UNLIT):
             found.append(f"{name}: {label} is unlit, so viewers ignore its occlusion texture")
     if found and any(

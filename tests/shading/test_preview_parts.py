@@ -18,7 +18,7 @@ from aobake.shading.ambient import multi_bounce, specular_occlusion
 from aobake.shading.camera import axes_from, framing, rays, sample_places
 from aobake.shading.picture import as_light, displayed
 from aobake.shading.preview import Preview
-from aobake.shading.sheet import check_room, sheet
+from aobake.shading.sheet import Sheet, check_room, sheet
 from aobake.shading.tone import from_srgb, to_srgb, toned
 from aobake.tracing.conditioning import UnitFrame
 
@@ -173,5 +173,27 @@ def test_a_sheet_has_the_size_asked_for_and_room_for_all(size: str, count: int) 
 
 def test_a_sheet_that_is_too_small_is_refused() -> None:
     with pytest.raises(SettingsError, match="too small for 13 pictures"):
-        check_room(RenderSettings(size="60x40"), 13)
-    check_room(dataclasses.replace(RenderSettings(), size="1280x720"), 13)
+        check_room(RenderSettings(size="60x40"), ["name"] * 13)
+    check_room(dataclasses.replace(RenderSettings(), size="1280x720"), ["name"] * 13)
+
+
+def test_a_sheet_whose_labels_could_not_be_read_is_refused() -> None:
+    check_room(RenderSettings(size="400x100"), ["few", "letters"])
+    with pytest.raises(SettingsError, match="labels that can be read"):
+        check_room(RenderSettings(size="400x100"), ["few", "a very long label " * 8])
+
+
+def test_a_long_label_makes_all_of_them_small_and_none_runs_into_the_next() -> None:
+    settings = RenderSettings(size="900x700")
+    apart = sheet(settings, ["HH", "HH"])
+    beside = sheet(settings, ["HH", "W" * 60])
+
+    def ink(page: Sheet, number: int) -> tuple[int, int]:
+        """Width of the label of a picture, and how much is drawn outside of the pictures' columns."""
+        dark = np.flatnonzero(page.pixels.min(axis=(0, 2)) < 0.7)
+        starts = [left for left, _ in page.corners]
+        within = [(dark >= left) & (dark < left + page.cell[0]) for left in starts]
+        return int(np.ptp(dark[within[number]])), int((~np.any(within, axis=0)).sum())
+
+    assert ink(beside, 0)[0] < ink(apart, 0)[0]
+    assert ink(beside, 1)[1] == 0
