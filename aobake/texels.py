@@ -33,6 +33,18 @@ LEAST_RAYS = 4  # for each of them
 BAND_SAMPLES = 1 << 20  # of a band of rows; each takes about 200 bytes
 
 
+@dataclass(frozen=True)
+class Marked:
+    """count : samples; faces : on which the first few of them lie."""
+
+    count: int = 0
+    faces: tuple[int, ...] = ()
+
+    def with_more(self, other: Marked) -> Marked:
+        faces = tuple(dict.fromkeys((*self.faces, *other.faces)))
+        return Marked(self.count + other.count, faces[:EXAMPLES])
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TexelJob:
     """What all pages of a bake have in common.
@@ -43,7 +55,7 @@ class TexelJob:
     seconds : stage -> seconds, added to
     rays : spent by each band, added to
     samples, under_open_sky : in each band, and how many of them everything lies below, added to
-    tally : (instance, name of a state) -> texels in this state, and the faces of the first of them, added to
+    tally : (instance, name of a state) -> the samples in this state, added to
     """
 
     scene: Scene
@@ -57,20 +69,23 @@ class TexelJob:
     rays: list[int] = field(default_factory=list)
     samples: list[int] = field(default_factory=list)
     under_open_sky: list[int] = field(default_factory=list)
-    tally: dict[tuple[int, FindingKind], tuple[int, tuple[int, ...]]] = field(default_factory=dict)
+    tally: dict[tuple[int, FindingKind], Marked] = field(default_factory=dict)
 
     def findings(self) -> tuple[Finding, ...]:
-        """What was found about texels, instance by instance."""
+        """What was found about texels, in the order of the instances; those of one name are told together."""
+        order = {kind: rank for rank, kind in enumerate(STATES)}
+        told: dict[tuple[str, FindingKind], Marked] = {}
+        for number, kind in sorted(self.tally, key=lambda key: (key[0], order[key[1]])):
+            key = name_of(self.scene, number), kind
+            told[key] = told.get(key, Marked()).with_more(self.tally[number, kind])
         return tuple(
             Finding(
                 kind=kind,
-                where=f"{name_of(self.scene, number)}, texels on faces",
-                count=self.tally[number, kind][0],
-                examples=self.tally[number, kind][1],
+                where=f"{name}, texels on faces",
+                count=marked.count,
+                examples=marked.faces,
             )
-            for number in range(len(self.scene.instances))
-            for kind in STATES
-            if (number, kind) in self.tally
+            for (name, kind), marked in told.items()
         )
 
 
@@ -88,15 +103,22 @@ def trace_page(job: TexelJob, page: Page, number: int, report: Report | None = N
     for rows in _bands(size, finer):
         with timed(job.seconds, "texels"):
             found = texels(placed, rows, finer)
-
-        def advance(done: int, total: int, rows: range = rows) -> None:
-            if report is not None:
-                report((rows.start + len(rows) * done / max(total, 1)) / size)
-
         if len(found.pixel):
             numbers = _numbers(found.pixel, first, finer)
+            advance = _part_of(report, rows.start / size, len(rows) / size)
             _trace_band(job, page, members, found, numbers, traced, advance)
     return traced
+
+
+def _part_of(report: Report | None, begin: float, length: float) -> Report:
+    """What a part of the work reports its share to; all of it is 1 long."""
+    if report is None:
+        return lambda _: None
+    return lambda share: report(begin + length * share)
+
+
+def _in_counts(report: Report) -> Callable[[int, int], None]:
+    return lambda done, of: report(done / max(of, 1))
 
 
 def _bands(size: int, finer: int) -> Iterator[range]:
@@ -128,20 +150,22 @@ def _trace_band(
     found: Texels,
     numbers: NDArray[np.int64],
     traced: TracedPage,
-    advance: Callable[[int, int], None],
+    advance: Report,
 ) -> None:
     """Trace the samples of a band of rows into the page.
 
     members : for each instance on the page, itself and those that share its place in the file
     numbers : (T,) int64, what makes the directions of each sample its own
+    advance : called with the share of the band that is done
     """
     means, variances = np.empty(len(found.pixel)), np.empty(len(found.pixel))
     turns = np.array([min(len(several), MOST_TURNS) for several in members], np.int64)[found.owner]
     for count in np.unique(turns).tolist():
         chosen = np.flatnonzero(turns == count)
+        part = _part_of(advance, float(np.mean(turns < count)), len(chosen) / len(turns))
         several = [mine if min(len(mine), MOST_TURNS) == count else () for mine in members]
         means[chosen], variances[chosen] = _mean_over(
-            job, several, found, chosen, numbers, count, advance
+            job, several, found, chosen, numbers, count, part
         )
     with timed(job.seconds, "texels"):
         _put(found.pixel, means, variances, traced)
@@ -155,7 +179,7 @@ def _mean_over(
     chosen: NDArray[np.int64],
     numbers: NDArray[np.int64],
     turns: int,
-    advance: Callable[[int, int], None],
+    advance: Report,
 ) -> tuple[FloatArray, FloatArray]:
     """Mean and variance at the chosen samples, each over `turns` of the instances that are stored together.
 
@@ -170,11 +194,14 @@ def _mean_over(
     begins = np.cumsum([0, *(len(several) for several in members)])[found.owner[chosen]]
     flat = np.array([number for several in members for number in several], np.int32)
     for turn in range(turns):
+        part = _part_of(advance, turn / turns, 1.0 / turns)
         which = flat[begins + (numbers[chosen] + turn * sizes // turns) % sizes]
         with timed(job.seconds, "texels"):
             points = _points(job, found, chosen, which, numbers[chosen] * turns + turn)
         with timed(job.seconds, "trace"):
-            estimates = occlusion_at(job.prepared, points, job.ground, settings, advance, job.sky)
+            estimates = occlusion_at(
+                job.prepared, points, job.ground, settings, _in_counts(part), job.sky
+            )
         _count(job, which, found.face[chosen], estimates)
         total += estimates.mean
         squares += estimates.mean.astype(np.float64) ** 2
@@ -271,6 +298,5 @@ def _count(
         marked = np.flatnonzero(estimates.states == state)
         for number in np.unique(instances[marked]).tolist():
             mine = faces[marked[instances[marked] == number]]
-            count, examples = job.tally.get((number, kind), (0, ()))
-            examples = tuple(dict.fromkeys((*examples, *np.unique(mine)[:EXAMPLES].tolist())))
-            job.tally[number, kind] = count + len(mine), examples[:EXAMPLES]
+            more = Marked(len(mine), tuple(np.unique(mine)[:EXAMPLES].tolist()))
+            job.tally[number, kind] = job.tally.get((number, kind), Marked()).with_more(more)

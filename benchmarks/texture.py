@@ -17,7 +17,7 @@ from aobake import BakedTexture, BakeSettings, Instance, Mesh, Scene, bake_textu
 from aobake.meshes.lightmap import Unwrapped
 from aobake.meshes.scene import Attribute
 
-BUDGETS = (8, 16, 32, 64, 128, 256)
+BUDGETS = (8, 16, 32, 64, 96, 128, 256)
 TRACED = {"trace", "denoise"}
 GIVEN = {"unwrap", "compile"}  # of the asset, and of the first bake of a machine
 

@@ -54,6 +54,13 @@ def on_its_own_square(mesh: Triangles, half: float = 1.0, **material: object) ->
     )
 
 
+def shifted(x: float) -> FloatArray:
+    """A transform along x."""
+    transform = np.eye(4)
+    transform[0, 3] = x
+    return transform
+
+
 def beside(scene: Scene, *others: Triangles) -> Scene:
     """The scene with more to occlude it; the others lie on the same page, unwrapped."""
     more = tuple(
@@ -215,6 +222,49 @@ def test_progress_ends_a_bake_by_what_it_raises() -> None:
 
     with pytest.raises(Enough):
         bake_texture(Scene.from_arrays(*icosphere(2)), BakeSettings(size=64), progress=stop)
+
+
+def test_progress_never_goes_back() -> None:
+    """Also where several instances share a place: their turns are parts of one trace."""
+    square, cube = on_its_own_square(SQUARE), Scene.from_arrays(*CUBE)
+    others = [Instance(mesh=1, transform=shifted(x), stored_with=1) for x in (0.0, 2.0, 4.0)]
+    scene = Scene(
+        meshes=(*square.meshes, *cube.meshes),
+        instances=(*square.instances, *others),
+        materials=square.materials,
+        images=square.images,
+    )
+    seen: list[int] = []
+
+    def note(stage: str, done: int, total: int) -> None:
+        if stage == "trace":
+            seen.append(done)
+
+    settings = BakeSettings(size=64, rays=64, denoise="off", atlas="mesh")
+    bake_texture(scene, settings, progress=note)
+    assert len(seen) > 3
+    assert seen == sorted(seen)
+
+
+def test_instances_of_one_name_are_told_of_together() -> None:
+    """Five thousand of them would be as many lines."""
+    floor = on_its_own_square(SQUARE)
+    several = tuple(Instance(mesh=0, transform=shifted(4.0 * n)) for n in range(3))
+    boxes = [moved(CUBE, shift=(4.0 * n, 0.0, 0.25)) for n in range(3)]
+    scene = beside(
+        Scene(
+            meshes=floor.meshes,
+            instances=several,
+            materials=floor.materials,
+            images=floor.images,
+        ),
+        *boxes,
+    )
+    told = [f for f in baked(scene, uv="unwrap").findings if f.kind == "enclosed"]
+    assert len({f.where for f in told}) == len(told)
+    (floors,) = (f for f in told if "'floor'" in f.where)
+    (first,) = (f for f in told if "'other 0'" in f.where)
+    assert floors.count > 1.5 * first.count
 
 
 def test_strict_refuses_what_it_finds_at_texels() -> None:

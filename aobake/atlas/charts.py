@@ -10,10 +10,15 @@ from aobake.atlas.overlap_kernels import note_overlaps
 from aobake.atlas.partition import parts_of
 from aobake.meshes.scene import FloatArray, IntArray
 
-__all__ = ["laid_flat", "mended", "projected"]
+__all__ = ["counted", "laid_flat", "mended", "projected"]
 
 TOLERANCE = 1e-6  # share of a chart's size: what xatlas's float32 leaves unsure
 LEAST_AREA = 1e-4  # of its own that a triangle must keep in its chart
+
+
+def counted(count: int) -> str:
+    """A number of charts, in words for a message."""
+    return "1 chart" if count == 1 else f"{count:,} charts"
 
 
 def projected(dual: Dual, chosen: IntArray) -> tuple[FloatArray, IntArray]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aobake.atlas.charts import counted
 from aobake.atlas.existing import Unfolded, Verdict, chart_numbers, face_areas, judge
 from aobake.atlas.packing import pack
 from aobake.atlas.unwrap import Charts, unwrap
@@ -202,7 +203,7 @@ def _kept_page(
         instances=group,
         corners=tuple(corners),
         charts=tuple(charts),
-        origin=f"{reason}, so it is kept: {first} charts.",
+        origin=f"{reason}, so it is kept: {counted(first)}.",
     )
     return page, [Kept(uv_set=uv_set) for _ in group]
 
@@ -246,7 +247,7 @@ def _new_page(
         corners=tuple(uv[one.faces] for one, uv in zip(cut, packed.uv, strict=True)),
         charts=tuple(numbers),
         origin=(
-            f"unwrapped ({reason}): {first} charts, {packed.padding} pixels apart, fill "
+            f"unwrapped ({reason}): {counted(first)}, padding {packed.padding}, fill "
             f"{100 * packed.filled:.0f} % at {packed.texels_per_unit:.4g} texels per unit.{hurry}"
         ),
     )

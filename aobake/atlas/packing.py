@@ -9,18 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aobake.atlas.charts import counted
 from aobake.atlas.packing_kernels import place_charts, set_upright
 from aobake.atlas.unwrap import Charts
 from aobake.errors import InputError
 from aobake.meshes.scene import FloatArray, IntArray
-from aobake.settings import AtlasSettings
+from aobake.settings import MOST_TEXELS_PER_SIDE, AtlasSettings
 
 __all__ = ["Packed", "pack"]
 
 CELLS = (
     1024  # along a side: beyond twice as many texels, charts stand on every second one, and so on
 )
-MIP_PADDING = 32  # two texels of mip level 4: what a bilinear lookup reads beyond a chart on level 3
+MIP_PADDING = 32  # two texels of mip level 4: what a bilinear lookup on level 3 reads beyond
 LEAST_FILLED = 0.4  # share of the image that charts should reach before the padding is halved
 PACKABLE = 0.8  # share of an image that charts and their padding are expected to fill
 CLOSE = 1.004  # the largest scale is found to within this factor
@@ -231,15 +232,15 @@ def _on_image(
 
 def _too_small(outlines: _Outlines, settings: AtlasSettings, padding: int) -> str:
     """What was found, and the smallest size at which it is not."""
-    count = len(outlines.extent)
-    what = f"{count} charts, {padding} texels apart" + (
+    what = f"{counted(len(outlines.extent))} with padding {padding}" + (
         f" at {settings.texels_per_unit:g} texels per unit" if settings.texels_per_unit else ""
     )
     size = _smallest_size(outlines, settings, padding)
-    return (
-        f"the image is too small: {what}, do not fit onto {settings.size} x {settings.size} texels. "
-        f"A size of {size} is needed."
-    )
+    if size > MOST_TEXELS_PER_SIDE:
+        cure = "Ask for fewer texels per unit, less padding, or an image per mesh (--atlas mesh)."
+    else:
+        cure = f"A size of {size} is needed."
+    return f"the image is too small: {settings.size} x {settings.size} texels for {what}. {cure}"
 
 
 def _smallest_size(outlines: _Outlines, settings: AtlasSettings, padding: int) -> int:

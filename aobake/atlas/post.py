@@ -1,8 +1,8 @@
-"""What becomes of a traced page before it is an image: denoised, an old texture taken in, seams made equal,
-gutters filled.
+"""What becomes of a traced page before it is an image: the rims of what is buried lit, denoised, an old texture
+taken in, seams made equal, gutters filled.
 
-In this order: what is in an old texture is no noise, noise would be taken for seams, and gutters repeat what
-the charts have at their rims.
+In this order: a denoiser would spread what is buried; what is in an old texture is no noise; noise would be
+taken for seams; and gutters repeat what the charts have at their rims.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aobake.atlas.buried import lit_rims
 from aobake.atlas.gutter import fill_gutters
 from aobake.atlas.seams import Seams, equalised
 from aobake.stages import timed
@@ -59,6 +60,8 @@ def finished(
     chart = np.where(covered, page.chart, np.int32(-1))
     values = np.clip(np.where(covered, page.values, np.float32(1.0)), 0.0, 1.0)
     error = np.nan_to_num(page.error, nan=0.0, posinf=1.0)
+    with timed(spent, "finish"):
+        values = lit_rims(values, error, chart)
     if denoise:
         from aobake.atlas.denoise import denoised
 

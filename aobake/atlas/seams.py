@@ -31,6 +31,8 @@ CREASE = math.cos(
     math.radians(2.0)
 )  # normals farther apart see different hemispheres: a step is right there
 PLACES_PER_TEXEL = 2
+REAL_STEP = 0.1  # two sides that differ by more, and by more than noise, do so on the surface, too
+SURE = 4.0  # standard errors
 STAY = 0.01  # the step that is left is about this share of what it was
 LEAST_ERROR = 0.1  # of the middle one, lest a texel be nailed down
 MOST_ROUNDS = 200
@@ -89,14 +91,14 @@ def joined_seams(several: Sequence[Seams]) -> Seams:
 def equalised(
     values: Float32Array, error: Float32Array, covered: NDArray[np.bool_], seams: Seams
 ) -> Float32Array:
-    """A page on which bilinear lookups agree on both sides of every smooth seam.
+    """A page on which bilinear lookups agree on both sides of every smooth seam, but where they truly differ.
 
     values : (H, W) float32 in [0, 1]; error : (H, W) float32, their standard errors: where it is small, a
         value moves less
     covered : (H, W) bool; places whose lookup reads another texel are left out
     Returns (H, W) float32 in [0, 1]; only texels that a lookup on a seam reads have moved.
     """
-    texel, weight = _equations(seams, covered)
+    texel, weight = _without_real_steps(_equations(seams, covered), values, error)
     unknown, inverse = np.unique(texel, return_inverse=True)
     result = values.copy()
     if len(unknown) == 0:
@@ -104,8 +106,10 @@ def equalised(
     equations = inverse.reshape(texel.shape).astype(np.int32), weight
     flat = result.reshape(-1)
     start = flat[unknown].astype(np.float64)
-    moved = start + _least_change(equations, start, _stiffness(error.reshape(-1)[unknown]))
-    flat[unknown] = np.clip(moved, 0.0, 1.0)
+    errors = error.reshape(-1)[unknown]
+    most = REAL_STEP + SURE * errors  # a texel that a lookup hardly reads would be moved far beyond
+    change = np.clip(_least_change(equations, start, _stiffness(errors)), -most, most)
+    flat[unknown] = np.clip(start + change, 0.0, 1.0)
     return result
 
 
@@ -138,6 +142,23 @@ def _equations(
     weight = np.stack(factors, axis=-1).reshape(-1, 8)
     known = (covered.reshape(-1)[texel] | (weight == 0.0)).all(axis=1)
     return texel[known], weight[known]
+
+
+def _without_real_steps(
+    equations: tuple[NDArray[np.int64], NDArray[np.float64]],
+    values: Float32Array,
+    error: Float32Array,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """The equations of places whose two sides differ no more than noise and the width of texels explain.
+
+    A surface may step at a seam whose normals agree: where another one passes through it, and on coarse
+    meshes shaded smoothly, whose faces see different hemispheres. One side would be made black there.
+    """
+    texel, weight = equations
+    step = np.abs(np.einsum("sk,sk->s", weight, values.reshape(-1)[texel]))
+    noise = np.sqrt(np.einsum("sk,sk->s", weight**2, np.square(error.reshape(-1)[texel])))
+    small = step <= REAL_STEP + SURE * noise
+    return texel[small], weight[small]
 
 
 def _places(ends: FloatArray) -> FloatArray:

@@ -125,11 +125,23 @@ def test_the_noisier_side_moves() -> None:
         uv=np.array([[[[0.25, 0.25], [0.25, 0.75]], [[0.75, 0.25], [0.75, 0.75]]]]),
         smooth=np.array([True]),
     )
-    page = np.array([[0.2, 0.8], [0.2, 0.8]], np.float32)
+    page = np.array([[0.3, 0.4], [0.3, 0.4]], np.float32)
     sure = np.array([[0.001, 0.01], [0.001, 0.01]], np.float32)
     after = equalised(page, sure, np.ones((2, 2), bool), seams)
     assert after[0, 1] == pytest.approx(after[0, 0], abs=0.01)
-    assert abs(after[0, 0] - 0.2) < 0.02
+    assert abs(after[0, 0] - 0.3) < 0.01
+
+
+@pytest.mark.parametrize(("error", "moves"), [(0.002, False), (0.3, True)])
+def test_a_step_that_no_noise_explains_stays(error: float, moves: bool) -> None:
+    """Where a body passes through the surface one side is closed: the open one would be made black."""
+    seams = Seams(
+        uv=np.array([[[[0.25, 0.25], [0.25, 0.75]], [[0.75, 0.25], [0.75, 0.75]]]]),
+        smooth=np.array([True]),
+    )
+    page = np.array([[0.0, 0.9], [0.0, 0.9]], np.float32)
+    after = equalised(page, np.full_like(page, error), np.ones((2, 2), bool), seams)
+    assert bool((after != page).any()) == moves
 
 
 def test_values_stay_in_range() -> None:

@@ -60,7 +60,7 @@ def test_success_says_what_was_baked_and_onto_what(run: Run, corner: Path, tmp_p
     ran = run("texture", corner, "-o", tmp_path / "out.glb", *FEW)
     assert ran.out.count("\n") == 3
     assert "texels of 1 mesh" in ran.out
-    assert "charts" in ran.out
+    assert "1 chart, padding 2," in ran.out
     assert ran.err == ""
 
 
@@ -105,7 +105,7 @@ def test_the_same_input_gives_the_same_bytes(
         (("--size", "1000000"), ("--size",)),
         (("--supersample", "3"), ("1, 2 or 4",)),
         (("--encoding", "half"), ("glTF holds PNG",)),
-        (("--texels-per-unit", "1e9"), ("size",)),
+        (("--texels-per-unit", "1e9"), ("too small", "fewer texels per unit")),
         (("--denoize", "on"), ("--denoise",)),
     ],
 )
@@ -117,6 +117,18 @@ def test_what_cannot_be_is_one_line_and_writes_nothing(
     assert ran.status in {1, 2}
     assert one_line(ran.err, *says)
     assert sorted(p.name for p in tmp_path.iterdir()) == [corner.name]
+
+
+@pytest.mark.parametrize("name", ["out.glb", "out.png"])
+def test_an_asset_without_area_is_one_line_and_writes_nothing(
+    run: Run, tmp_path: Path, name: str
+) -> None:
+    flat = tmp_path / "flat.obj"
+    flat.write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+    ran = run("texture", flat, "-o", tmp_path / name)
+    assert ran.status == 1
+    assert one_line(ran.err, "flat.obj", "no triangle has an area")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["flat.obj"]
 
 
 def test_a_format_without_textures_is_refused_before_the_bake(
