@@ -166,9 +166,7 @@ def _fixed_bodies(
         details.append(frame.apply(watched.positions))
         sizes.append(np.full(len(watched.positions), watched.detail * frame.scale))
     standing = [(at, parts[p.part]) for at, p in zip(placed, fixed, strict=False)]
-    bodies = [
-        _Body(at, part.faces, part.hit_filter) for at, part in standing if _as_they_are(part)
-    ]
+    bodies = [_Body(at, part.faces, part.hit_filter) for at, part in standing if _as_they_are(part)]
     plain = [(at, part) for at, part in standing if not _as_they_are(part)]
     for hit_filter in dict.fromkeys(part.hit_filter for _, part in plain):
         split = [

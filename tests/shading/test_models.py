@@ -224,7 +224,9 @@ def test_an_unknown_model_is_answered_with_the_nearest_and_all_of_them() -> None
 def test_an_unknown_parameter_is_answered_with_the_nearest() -> None:
     with pytest.raises(aobake.SettingsError, match=r'rougness.*Did you mean "roughness"'):
         evaluate(model("cook-torrance"), UP, UP, UP, {"rougness": 0.1})
-    with pytest.raises(aobake.SettingsError, match=r"k is no parameter of lambert\. Models with it: minnaert"):
+    with pytest.raises(
+        aobake.SettingsError, match=r"k is no parameter of lambert\. Models with it: minnaert"
+    ):
         evaluate(model("lambert"), UP, UP, UP, {"k": 0.1})
 
 

@@ -218,7 +218,9 @@ def test_an_occlusion_texture_shows_the_values_through_its_own_set(tmp_path: Pat
     assert len(after["bufferViews"]) == len(unpack_glb(source)[0]["bufferViews"]) + 2
     warnings = gltf.check(load(source), StoreSettings(store="occlusion"), tmp_path / "out.glb")
     assert len(warnings) == 1
-    assert 'material 0 "wood" has an occlusion texture, which gives way to the new one' in warnings[0]
+    assert (
+        'material 0 "wood" has an occlusion texture, which gives way to the new one' in warnings[0]
+    )
 
 
 def test_materials_are_copied_where_something_else_uses_them(tmp_path: Path) -> None:
