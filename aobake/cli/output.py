@@ -36,10 +36,12 @@ def check_asset_target(
     suffix = path.suffix.lower()
     if suffix not in formats:
         of = f" of {inputs[0].name}" if inputs else ""
-        raise SettingsError(
+        message = (
             f"{path}: {suffix or 'a name without an ending'} cannot hold {what}{of}."
             f"{nearest(suffix, formats)}"
         )
+        own = any(read.suffix.lower() == suffix for read in inputs)  # the asset is at odds with it
+        raise OutputError(message) if own else SettingsError(message)
     check_target(path, force=force, inputs=inputs)
 
 

@@ -137,3 +137,13 @@ def test_a_format_without_textures_is_refused_before_the_bake(
     ran = run("texture", corner, "-o", tmp_path / "out.ply")
     assert ran.status == 2
     assert one_line(ran.err, "out.ply", ".glb")
+
+
+def test_a_format_of_its_own_that_holds_no_texture_ends_with_status_1(
+    run: Run, corner: Path, tmp_path: Path
+) -> None:
+    own = tmp_path / "room.ply"
+    assert run("vertex", corner, "-o", own, "--rays", 4).status == 0
+    ran = run("texture", own, "-o", tmp_path / "out.ply")
+    assert ran.status == 1
+    assert one_line(ran.err, "out.ply", "room.ply", ".glb")
