@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aobake.findings import Finding
-from aobake.leastsquares import fitted_vertices
 from aobake.meshes.normals import unit_rows
 from aobake.meshes.scene import Scene
 from aobake.meshes.surface import findings
@@ -73,6 +72,10 @@ def bake_vertices(
     with timed(seconds, "trace"):
         report = None if progress is None else partial(progress, "trace")
         if fitted:
+            from aobake.leastsquares import (
+                fitted_vertices,
+            )  # loads scipy's solvers, a third of a second
+
             found = fitted_vertices(scene, prepared, ground, settings, report)
         else:
             alike = first_alike(scene, settings, ground)

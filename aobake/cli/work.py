@@ -14,7 +14,6 @@ from aobake import (
     ImageSettings,
     Scene,
     StoreSettings,
-    bake_texture,
     bake_vertices,
     load,
     report,
@@ -68,6 +67,8 @@ def bake_vertices_to(scene: Scene, work: Work) -> report.Report:
 
 def bake_texture_to(scene: Scene, work: Work) -> report.Report:
     """Bake a scene to a texture, write it and the report, and say so unless told to be quiet."""
+    from aobake import bake_texture  # brings the atlas with it, which vertices need not wait for
+
     image = work.chosen.image
 
     def notes(baked: BakedVertices | BakedTexture | None) -> Sequence[str]:

@@ -16,7 +16,7 @@ import pytest
 
 import aobake
 from tests.conftest import Run
-from tests.support import one_line
+from tests.support import modules_after, one_line
 
 
 def colours(path: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
@@ -187,3 +187,11 @@ def test_a_signal_ends_a_long_bake_within_a_second_and_leaves_nothing(
     assert "Traceback" not in err
     assert [p.name for p in tmp_path.iterdir()] == ["corner.obj"]
     assert waited < 3.0  # a second by design; the rest is for busy machines
+
+
+def test_a_vertex_bake_loads_nothing_that_it_does_not_need(corner: Path, tmp_path: Path) -> None:
+    """What textures, fits and pictures need takes a second to import."""
+    arguments = ["vertex", str(corner), "-o", str(tmp_path / "out.obj"), "--rays", "4", "--quiet"]
+    loaded = modules_after(["from aobake.cli.app import run", f"run({arguments!r})"])
+    assert (tmp_path / "out.obj").exists()
+    assert not loaded & {"OpenImageIO", "xatlas", "pymetis", "pyoidn", "matplotlib"}
