@@ -72,9 +72,8 @@ def bake_vertices(
     with timed(seconds, "trace"):
         report = None if progress is None else partial(progress, "trace")
         if fitted:
-            from aobake.leastsquares import (
-                fitted_vertices,
-            )  # loads scipy's solvers, a third of a second
+            # Here, since it loads scipy's solvers: a third of a second that other bakes need not wait.
+            from aobake.leastsquares import fitted_vertices
 
             found = fitted_vertices(scene, prepared, ground, settings, report)
         else:

@@ -1,6 +1,6 @@
 """Pictures of each effect, without and with it, on a scene that calls for it: for docs/effects.md.
 
-python benchmarks/effect_pictures.py FOLDER
+python benchmarks/effect_pictures.py [--pictures FOLDER]
 """
 
 from __future__ import annotations
@@ -189,13 +189,16 @@ def bent_normals() -> NDArray[np.float32]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path)
-    folder = parser.parse_args().folder
+    parser.add_argument(
+        "--pictures", type=Path, help="folder to write them to; else only their sizes"
+    )
+    folder = parser.parse_args().pictures
     pictures = {name: picture(pair) for name, pair in pairs().items()}
     for name, pixels in {**pictures, "bent_normals": bent_normals()}.items():
-        path = folder / f"effect-{name}.png"
-        path.write_bytes(encode(pixels, "png", "8", srgb=True))
-        print(f"{path}: {path.stat().st_size / 1024:.0f} KB")
+        data, file = encode(pixels, "png", "8", srgb=True), f"effect-{name}.png"
+        if folder is not None:
+            (folder / file).write_bytes(data)
+        print(f"{file}: {len(data) / 1024:.0f} KB")
 
 
 if __name__ == "__main__":
