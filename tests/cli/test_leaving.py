@@ -33,7 +33,7 @@ def test_an_interrupt_that_is_dropped_ends_the_process_all_the_same() -> None:
     _, err = process.communicate(timeout=20)
     assert process.returncode == 130
     assert err == "aobake: error: interrupted.\n"
-    assert time.monotonic() - started < 5.0  # 0.7 s by design; the rest is for busy machines
+    assert time.monotonic() - started < 15.0  # 0.7 s by design; the rest is for busy machines
 
 
 def test_signals_are_heard_as_before_once_it_is_over() -> None:

@@ -186,7 +186,7 @@ def test_a_signal_ends_a_long_bake_within_a_second_and_leaves_nothing(
     assert process.returncode == status, err
     assert "Traceback" not in err
     assert [p.name for p in tmp_path.iterdir()] == ["corner.obj"]
-    assert waited < 3.0  # a second by design; the rest is for busy machines
+    assert waited < 10.0  # a second by design, minutes without it; the rest is for busy machines
 
 
 def test_a_vertex_bake_loads_nothing_that_it_does_not_need(corner: Path, tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import time
 from pathlib import Path
 from typing import Any
 
@@ -255,17 +254,17 @@ def test_whatever_is_damaged_all_that_is_offered_is_given_or_refused(tmp_path: P
     path = rich().glb(tmp_path / "a.glb")
     document, binary, _ = unpack_glb(path)
     rng = random.Random(5)
-    end, rounds = time.monotonic() + 1.2, 0
-    while time.monotonic() < end:
-        rounds += 1
+    opened = 0
+    for _ in range(60):
         path.write_bytes(pack_glb(damaged_json(document, rng), binary))
         try:
             scene = load(path)
         except InputError:
             continue
+        opened += 1
         wanted = [
             lambda m=m, name=name: m.at_corners(name) for m in scene.meshes for name in m.attributes
         ]
         for look in (*wanted, *(image.data for image in scene.images)):
             assert "\n" not in refused(look)
-    assert rounds > 20
+    assert opened
