@@ -8,6 +8,7 @@ Scans of 70,000 to 100,000 faces take seconds so, where xatlas alone takes minut
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
@@ -36,8 +37,11 @@ PARTS = (
     8 * 2000**-0.5
 )  # times the root of the number of faces: 14 parts of 6,000 faces, 47 of 70,000
 MOST_STRETCH = 1.05  # L2, of a chart (P. Sander et al., Texture mapping progressive meshes, 2001)
+KEPT_S = 0.5  # after its last use
 BATCH = 2000  # faces laid flat by a thread, or given to xatlas, before anything else is attended to
 POLL_SECONDS = 0.1
+
+_kept: deque[tuple[float, object]] = deque()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -254,6 +258,7 @@ def _by_xatlas(
     import xatlas
 
     atlas = xatlas.Atlas()
+    _keep_for_a_while(atlas)
     for faces in pieces:
         used, local = np.unique(dual.faces[faces], return_inverse=True)
         points = dual.vertices[used]
@@ -275,3 +280,15 @@ def _by_xatlas(
         count += atlas.get_mesh_chart_count(number)
         count = _project(dual, faces[~placed], uv, chart, count)
     return count
+
+
+def _keep_for_a_while(atlas: object) -> None:
+    """Hold an atlas until its threads have surely gone to sleep, and let go of those that were held so.
+
+    The end of an atlas wakes its threads without holding their lock: one that is just about to sleep misses
+    that, and the process waits for it for ever (seen once on a busy machine, with xatlas 0.0.11).
+    """
+    now = time.monotonic()
+    _kept.append((now, atlas))
+    while now - _kept[0][0] > KEPT_S:
+        _kept.popleft()
