@@ -100,6 +100,11 @@ class BakedTexture:
         return self.lightmap.pages
 
     @property
+    def bent_normals(self) -> tuple[Float32Array, ...] | None:
+        """(H, W, 3) float32 of each image, unit length, in the space of settings.bent_space; None: not asked for."""
+        return None if self.lightmap.bent is None else self.lightmap.bent.pages
+
+    @property
     def image(self) -> Float32Array:
         """The one image. Raises InputError where there are several, or none."""
         return self._one(self.images)

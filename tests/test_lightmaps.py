@@ -15,8 +15,8 @@ from aobake import (
     Mesh,
     Scene,
     bake_texture,
+    bands,
     images,
-    texels,
 )
 from aobake.atlas.lookup import sample
 from aobake.meshes.scene import Attribute, Image, Texture
@@ -120,7 +120,7 @@ def test_bands_and_threads_do_not_change_a_byte(
 ) -> None:
     scene = beside(on_its_own_square(SQUARE), moved(CUBE, shift=(0.0, 0.0, 0.4)))
     whole = baked(scene, supersample=supersample, threads=1)
-    monkeypatch.setattr(texels, "BAND_SAMPLES", 777)
+    monkeypatch.setattr(bands, "BAND_SAMPLES", 777)
     cut = baked(scene, supersample=supersample, threads=3)
     assert cut.image.tobytes() == whole.image.tobytes()
     assert cut.standard_errors[0].tobytes() == whole.standard_errors[0].tobytes()

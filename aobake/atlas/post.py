@@ -13,24 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.atlas.buried import lit_rims
-from aobake.atlas.gutter import fill_gutters
+from aobake.atlas.gutter import REACH_PX, fill_gutters, nearest_covered
 from aobake.atlas.seams import Seams, equalised
 from aobake.stages import timed
 
-__all__ = ["TracedPage", "finished"]
+__all__ = ["TracedPage", "finished", "finished_bent"]
 
 Float32Array = NDArray[np.float32]
+UP = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TracedPage:
-    """A page of texels as it was traced.
+    """A page of texels as it was traced, or some rows of one.
 
     values : (H, W) float32 in [0, 1]; texels of charts that are not finite count as gutters
     error : (H, W) float32, the standard error of each
     chart : (H, W) int32, the chart of each texel, numbered from 0; -1: none
     normal : (H, W, 3) float32, unit length, which guides the denoiser; or None
     before : (H, W) float32, what an occlusion texture held, which is multiplied in; None: nothing is
+    bent : (H, W, 3) float32, unit length, the mean open direction in the space asked for; or None
     """
 
     values: Float32Array
@@ -38,6 +40,48 @@ class TracedPage:
     chart: NDArray[np.int32]
     normal: Float32Array | None
     before: Float32Array | None = None
+    bent: Float32Array | None = None
+
+    @classmethod
+    def blank(
+        cls,
+        shape: tuple[int, int],
+        *,
+        normal: bool = False,
+        before: bool = False,
+        bent: bool = False,
+    ) -> TracedPage:
+        """Rows and columns without a chart, open and sure. normal, before, bent : whether these are kept."""
+        return cls(
+            values=np.ones(shape, np.float32),
+            error=np.zeros(shape, np.float32),
+            chart=np.full(shape, -1, np.int32),
+            normal=np.zeros((*shape, 3), np.float32) if normal else None,
+            before=np.ones(shape, np.float32) if before else None,
+            bent=np.zeros((*shape, 3), np.float32) if bent else None,
+        )
+
+    def blank_like(self, shape: tuple[int, int]) -> TracedPage:
+        """Other rows and columns of which the same is kept, without a chart."""
+        return TracedPage.blank(
+            shape,
+            normal=self.normal is not None,
+            before=self.before is not None,
+            bent=self.bent is not None,
+        )
+
+    def put(self, rows: range, part: TracedPage) -> None:
+        """Take in successive rows, which have what the page has."""
+        for mine, given in (
+            (self.values, part.values),
+            (self.error, part.error),
+            (self.chart, part.chart),
+            (self.normal, part.normal),
+            (self.before, part.before),
+            (self.bent, part.bent),
+        ):
+            if mine is not None and given is not None:
+                mine[rows.start : rows.stop] = given
 
 
 def finished(
@@ -72,3 +116,17 @@ def finished(
             values = values * np.where(covered, page.before, np.float32(1.0))
         values = equalised(values, error, covered, seams)
         return fill_gutters(values, covered)
+
+
+def finished_bent(page: TracedPage) -> Float32Array:
+    """The bent normals of a page, with its gutters filled: (H, W, 3) float32, straight up where no chart is near.
+
+    They are neither denoised nor made equal at seams, where the space of a normal map changes. Raises
+    ValueError for a page without any.
+    """
+    if page.bent is None:
+        raise ValueError("the page was traced without bent normals")
+    nearest = nearest_covered(page.chart >= 0, REACH_PX)
+    filled = page.bent.reshape(-1, 3)[nearest]
+    filled[nearest < 0] = UP
+    return filled

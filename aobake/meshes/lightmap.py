@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.meshes.scene import FloatArray, IntArray
+from aobake.settings import BentSpace
 
-__all__ = ["Kept", "Lightmap", "Placing", "Unwrapped"]
+__all__ = ["BentPages", "Kept", "Lightmap", "Placing", "Unwrapped"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,13 +51,31 @@ class Placing:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class BentPages:
+    """Bent normals beside the images of a lightmap.
+
+    pages : (H, W, 3) float32 of each image, unit length, row 0 at the top; x runs along growing u, y up the
+        image and z along the normal in tangent space, and all three as in the mesh in object space
+    """
+
+    pages: tuple[NDArray[np.float32], ...]
+    space: BentSpace
+
+    def image(self, page: int) -> NDArray[np.float32]:
+        """(H, W, 3) float32 in [0, 1], as an image keeps them: n / 2 + 1 / 2."""
+        return np.asarray(0.5 * self.pages[page] + 0.5, np.float32)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Lightmap:
     """What is written into an asset.
 
     pages : (H, W) float32 images in [0, 1], row 0 at the top, 1 = open
     placings : one per instance of the scene; None for one without a triangle. Instances that are stored
         together (Instance.stored_with) have the same one
+    bent : bent normals in images of their own; None where they were not asked for
     """
 
     pages: tuple[NDArray[np.float32], ...]
     placings: tuple[Placing | None, ...]
+    bent: BentPages | None = None
