@@ -20,6 +20,7 @@ __all__ = [
     "AtlasSettings",
     "Backfaces",
     "BakeSettings",
+    "BentSpace",
     "Blend",
     "Denoise",
     "Distribution",
@@ -48,6 +49,7 @@ Store = Literal["color", "occlusion", "attribute"]
 AtlasScope = Literal["scene", "material", "mesh"]
 Denoise = Literal["auto", "on", "off"]
 Blend = Literal["replace", "multiply"]
+BentSpace = Literal["tangent", "object"]
 Encoding = Literal["8", "16", "half", "float"]
 Pack = Literal["separate", "orm"]
 UV_CHOICES = ("auto", "keep", "unwrap")
@@ -256,6 +258,10 @@ class AtlasSettings:
     """What becomes of an occlusion texture that is there already: replace leaves it unused, multiply
     takes its values into the new one."""
 
+    bent_space: BentSpace = "tangent"
+    """What the bent normals of a texture are relative to: tangent keeps them as normal maps are, object
+    in the space of each mesh, as its normals are."""
+
     def __post_init__(self) -> None:
         if str(self.uv) not in UV_CHOICES and not (
             str(self.uv).isascii() and str(self.uv).isdigit()
@@ -277,6 +283,7 @@ class AtlasSettings:
             raise SettingsError(f"normal_map is {self.normal_map!r}; True or False is needed.")
         _choice("denoise", self.denoise, get_args(Denoise))
         _choice("blend", self.blend, get_args(Blend))
+        _choice("bent_space", self.bent_space, get_args(BentSpace))
 
 
 @dataclass(frozen=True, kw_only=True)

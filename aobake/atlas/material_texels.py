@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from aobake import images
 from aobake.atlas.lookup import looked_up
-from aobake.atlas.tangents import normal_mapped, tangents_at_corners
+from aobake.atlas.tangents import normal_mapped, placed_tangents, tangents_at_corners
 from aobake.errors import InputError
 from aobake.meshes.scene import FloatArray, IntArray, Mesh, Scene, Texture
 from aobake.meshes.surface import Surface
 from aobake.points import SurfacePoints
-from aobake.prepare import Prepared, mirrors
+from aobake.prepare import Prepared
 
 __all__ = ["MaterialTexels"]
 
@@ -33,7 +33,7 @@ class MaterialTexels:
         self.scene = scene
         self.warnings: list[str] = []
         self._decoded: dict[int, Pixels | None] = {}
-        self._frames: dict[int, FloatArray] = {}
+        self._frames: dict[int, FloatArray | None] = {}
 
     def occlusion(self, mesh: Mesh, faces: IntArray, weights: FloatArray) -> Pixels | None:
         """(T,) what is left of the light at points of a mesh by its occlusion texture; None without one.
@@ -78,36 +78,37 @@ class MaterialTexels:
         stored = self._normal_map(mesh, faces, weights)
         if stored is None or mesh.material is None or points.geometric is None:
             return
-        frames = self._tangents(instance.mesh, surface)[faces]
-        tangents = np.einsum("tc,tcx->tx", _shares(weights), frames)
-        linear = instance.transform[:3, :3]
-        tangents[:, :3] = tangents[:, :3] @ linear.T
-        if mirrors(linear):
-            tangents[:, 3] *= -1.0
+        frames = self.tangents(instance.mesh, surface)
+        if frames is None:
+            return
         points.normals[rows] = normal_mapped(
             stored,
             self.scene.materials[mesh.material].normal_scale,
-            tangents,
+            placed_tangents(frames, faces, weights, instance.transform[:3, :3]),
             points.normals[rows],
             points.geometric[rows],
         )
 
-    def _tangents(self, number: int, surface: Surface) -> FloatArray:
-        """(F, 3, 4) tangents of a mesh: its own, or those that MikkTSpace defines."""
+    def tangents(self, number: int, surface: Surface) -> FloatArray | None:
+        """(F, 3, 4) tangents of a mesh: its own, or those that MikkTSpace defines.
+
+        None where it has neither tangents nor the texture coordinates of its normal map (TEXCOORD_0 without one).
+        """
         if number not in self._frames:
             mesh = self.scene.meshes[number]
             given = self._noted(lambda: mesh.at_corners("TANGENT"))
             self._frames[number] = self._computed(mesh, surface) if given is None else given
         return self._frames[number]
 
-    def _computed(self, mesh: Mesh, surface: Surface) -> FloatArray:
+    def _computed(self, mesh: Mesh, surface: Surface) -> FloatArray | None:
         texture = (
             None if mesh.material is None else self.scene.materials[mesh.material].normal_texture
         )
-        uv = mesh.at_corners(f"TEXCOORD_{texture.uv_set if texture else 0}")
-        corners = mesh.vertices[mesh.faces]
-        flat = np.zeros((len(mesh.faces), 3, 2)) if uv is None else uv
-        return tangents_at_corners(corners, surface.normals[mesh.faces], flat)
+        uv_set = texture.uv_set if texture else 0
+        uv = self._noted(lambda: mesh.at_corners(f"TEXCOORD_{uv_set}"))
+        if uv is None:
+            return None
+        return tangents_at_corners(mesh.vertices[mesh.faces], surface.normals[mesh.faces], uv)
 
     def _at(
         self, mesh: Mesh, texture: Texture | None, faces: IntArray, weights: FloatArray

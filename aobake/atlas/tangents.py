@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from aobake.atlas.tangent_kernels import ANY, PRESERVING, UNUSABLE, sew, share_tangents
 from aobake.meshes.coincident import first_equal_row
 from aobake.meshes.normals import unit_rows
-from aobake.meshes.scene import FloatArray
+from aobake.meshes.scene import FloatArray, IntArray
+from aobake.prepare import mirrors
 from aobake.tracing.compiled import read_only
 
-__all__ = ["normal_mapped", "tangents_at_corners"]
+__all__ = ["in_tangent_space", "normal_mapped", "placed_tangents", "tangents_at_corners"]
 
 HORIZON = 0.01  # least cosine between a mapped normal and the surface's own
 
@@ -40,6 +41,22 @@ def tangents_at_corners(positions: FloatArray, normals: FloatArray, uv: FloatArr
     return frames
 
 
+def placed_tangents(
+    frames: FloatArray, faces: IntArray, weights: FloatArray, linear: FloatArray
+) -> FloatArray:
+    """(N, 4) tangents of any length, and the bitangent's sign, at points of a mesh where it stands.
+
+    frames : (F, 3, 4) at corners; faces, weights : (N,) and (N, 2), of the second and third corner
+    linear : (3, 3) what is done to directions of the mesh
+    """
+    shares = np.stack([1.0 - weights.sum(axis=1), weights[:, 0], weights[:, 1]], axis=1)
+    tangents = np.einsum("tc,tcx->tx", shares, frames[faces])
+    tangents[:, :3] = tangents[:, :3] @ linear.T
+    if mirrors(linear):
+        tangents[:, 3] *= -1.0
+    return tangents
+
+
 def normal_mapped(
     stored: NDArray[np.float32],
     scale: float,
@@ -56,15 +73,31 @@ def normal_mapped(
     Source: glTF 2.0, 3.9.3, and its appendix B on bitangents.
     """
     x, y, z = np.moveaxis(2.0 * stored.astype(np.float64) - 1.0, 1, 0)[..., None]
-    along = tangents[:, :3] - _dot(tangents[:, :3], normals) * normals
-    along = unit_rows(along)
-    up = np.cross(normals, along) * np.where(tangents[:, 3:] < 0.0, -1.0, 1.0)
+    along, up = _axes(tangents, normals)
     turned = unit_rows(scale * (x * along + y * up) + z * normals)
     turned = np.where(turned.any(axis=1, keepdims=True), turned, normals)
     height = _dot(turned, geometric)
     level = unit_rows(turned - height * geometric)
     raised = HORIZON * geometric + np.sqrt(1.0 - HORIZON**2) * level
     return np.where(height < HORIZON, unit_rows(raised), turned)
+
+
+def in_tangent_space(
+    directions: FloatArray, tangents: FloatArray, normals: FloatArray
+) -> FloatArray:
+    """(N, 3) directions along the tangent, the bitangent and the normal: what a normal map holds of them.
+
+    directions : (N, 3); tangents : (N, 4) as for normal_mapped; normals : (N, 3) unit length
+    """
+    along, up = _axes(tangents, normals)
+    parts = [_dot(directions, axis) for axis in (along, up, normals)]
+    return np.concatenate(parts, axis=1)
+
+
+def _axes(tangents: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(N, 3) unit tangents and bitangents, across unit normals."""
+    along = unit_rows(tangents[:, :3] - _dot(tangents[:, :3], normals) * normals)
+    return along, np.cross(normals, along) * np.where(tangents[:, 3:] < 0.0, -1.0, 1.0)
 
 
 def _fill(positions: FloatArray, normals: FloatArray, uv: FloatArray, frames: FloatArray) -> None:

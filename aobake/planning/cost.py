@@ -101,7 +101,7 @@ def estimated(
         points=scene.vertices if texels is None else texels,
         rays=round(rays * traced),
         bytes=size,
-        effects=_of_effects(decided, seconds["trace"], _extra_bytes(scene, decided)),
+        effects=_of_effects(decided, seconds["trace"], _extra_bytes(scene, decided, wanted)),
     )
 
 
@@ -134,9 +134,9 @@ def _in_runs(count: int, wanted: int) -> np.ndarray[tuple[int], np.dtype[np.int6
     return np.unique(np.maximum(starts[:, None], 0) + np.arange(min(RUN, count)))
 
 
-def _extra_bytes(scene: Scene, decided: Plan) -> dict[str, int]:
+def _extra_bytes(scene: Scene, decided: Plan, points: int) -> dict[str, int]:
     """Memory that effects take beside what every bake takes; those that are not named take none."""
-    found = {"bent_normals": BENT_BYTES * scene.vertices}
+    found = {"bent_normals": BENT_BYTES * max(scene.vertices, points)}
     if decided.effects["alpha"].on:
         from aobake.meshes.alpha import scene_alpha
 

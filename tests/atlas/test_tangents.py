@@ -7,7 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from aobake.atlas.tangents import normal_mapped, tangents_at_corners
+from aobake.atlas.tangents import (
+    in_tangent_space,
+    normal_mapped,
+    placed_tangents,
+    tangents_at_corners,
+)
 from tests.scenes import FloatArray, IntArray, Triangles, icosphere, patch, unit
 
 Frame = tuple[FloatArray, float]
@@ -219,3 +224,19 @@ def test_a_map_or_a_tangent_without_direction_leaves_the_normal() -> None:
     ):
         found = normal_mapped(np.array([stored], np.float32), 1.0, tangent, normal, normal)
         assert np.abs(found - normal).max() < 1e-7
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_what_is_held_along_tangents_is_what_a_normal_map_gives_back(mirror: float) -> None:
+    """Also where tangents are no unit vectors and lean, and where the instance is mirrored and sheared."""
+    rng = np.random.default_rng(3)
+    frames = np.concatenate([rng.normal(size=(9, 3, 3)), np.ones((9, 3, 1))], axis=2)
+    linear = np.diag([mirror, 2.0, 0.5]) + 0.1
+    faces, weights = np.arange(9, dtype=np.int32), np.full((9, 2), 1.0 / 3.0)
+    tangents = placed_tangents(frames, faces, weights, linear)
+    assert (tangents[:, 3] == (1.0 if np.linalg.det(linear) > 0.0 else -1.0)).all()
+    normals = np.array([unit(rng.normal(size=3)) for _ in faces])
+    wanted = np.array([unit(n + 0.6 * unit(rng.normal(size=3))) for n in normals])
+    held = in_tangent_space(wanted, tangents, normals)
+    stored = (0.5 * held + 0.5).astype(np.float32)
+    assert normal_mapped(stored, 1.0, tangents, normals, normals) == pytest.approx(wanted, abs=1e-6)

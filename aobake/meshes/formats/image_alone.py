@@ -45,16 +45,31 @@ def check_texture(
 def write_texture(
     scene: Scene, lightmap: Lightmap, target: Path, image: ImageSettings
 ) -> tuple[Path, ...]:
-    """Write every image: NAME.png, NAME_2.png, ...; the files written. Raises OutputError, with none written."""
+    """Write every image: NAME.png, NAME_2.png, ..., and bent normals as NAME_bent_normal.png, ...
+
+    Returns the files written. Raises OutputError, with none written.
+    """
     check_texture(scene, image, target)
     kind = KINDS[target.suffix.lower()]
     paths = _paths(target, lightmap)
     contents = [encode(page, kind, image.encoding) for page in lightmap.pages]
+    if lightmap.bent is not None:
+        pages = range(len(lightmap.bent.pages))
+        contents += [encode(lightmap.bent.image(page), kind, image.encoding) for page in pages]
     write_files(dict(reversed(list(zip(paths, contents, strict=True)))))
     return paths
 
 
 def _paths(target: Path, lightmap: Lightmap | None) -> tuple[Path, ...]:
-    count = 1 if lightmap is None else len(lightmap.pages)
-    others = [target.with_name(f"{target.stem}_{n}{target.suffix}") for n in range(2, count + 1)]
-    return (target, *others)[:count]
+    if lightmap is None:
+        return (target,)
+    paths = _numbered(target, len(lightmap.pages))
+    if lightmap.bent is None:
+        return paths
+    beside = target.with_name(f"{target.stem}_bent_normal{target.suffix}")
+    return (*paths, *_numbered(beside, len(lightmap.bent.pages)))
+
+
+def _numbered(first: Path, count: int) -> tuple[Path, ...]:
+    others = [first.with_name(f"{first.stem}_{n}{first.suffix}") for n in range(2, count + 1)]
+    return (first, *others)[:count]

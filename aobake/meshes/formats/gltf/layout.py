@@ -112,10 +112,12 @@ def _old_binary(layout: Layout, document: Document) -> list[Bytes] | None:
     return [binary] if layout.glb and binary is not None and layout.buffer != 0 else None
 
 
-def free_name(target: Path, document: Document, ending: str, taken: Collection[Path] = ()) -> Path:
+def free_name(
+    target: Path, document: Document, ending: str, taken: Collection[Path] = (), what: str = "ao"
+) -> Path:
     """A name beside the target for new bytes: one that is free, or that an earlier bake took for them.
 
-    taken : names given away already
+    taken : names given away already; what : the bytes are, a word in the name
     A file that the source document itself needs is never taken. Raises OutputError.
     """
     needed = {side.path.resolve() for side in document.side_files().values()}
@@ -126,7 +128,7 @@ def free_name(target: Path, document: Document, ending: str, taken: Collection[P
     }
     earlier = known_uris(target)
     for number in range(1, 1000):
-        path = target.with_name(f"{target.stem}_ao{number if number > 1 else ''}{ending}")
+        path = target.with_name(f"{target.stem}_{what}{number if number > 1 else ''}{ending}")
         if path in taken or path.resolve() in needed:
             continue
         if not path.exists() or urllib.parse.quote(path.name) in earlier:

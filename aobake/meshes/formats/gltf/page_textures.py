@@ -5,6 +5,7 @@ from __future__ import annotations
 import urllib.parse
 from pathlib import Path
 
+from aobake.meshes.formats.gltf.bent_textures import with_bent_normals, without_bent_normals
 from aobake.meshes.formats.gltf.container import Bytes
 from aobake.meshes.formats.gltf.edit import NAME, Edit
 from aobake.meshes.formats.gltf.element import Element
@@ -12,7 +13,7 @@ from aobake.meshes.formats.gltf.jsontext import JsonObject
 from aobake.meshes.formats.gltf.layout import Layout, free_name
 from aobake.meshes.formats.gltf.looks import Look, with_occlusion
 from aobake.meshes.formats.gltf.orm import OrmImages, with_packed
-from aobake.meshes.lightmap import Lightmap
+from aobake.meshes.lightmap import BentPages, Lightmap
 from aobake.meshes.scene import Texture
 from aobake.settings import ImageSettings
 
@@ -38,10 +39,20 @@ class PageTextures:
         self._orm = OrmImages(edit.document) if settings.pack == "orm" else None
         self._pages: dict[int, int] = {}
         self._packed: dict[tuple[int, object, int], int] = {}
+        self._bent: dict[int, int] = {}
         self._sampler: int | None = None
 
     def dressed(self, material: JsonObject, look: Look) -> JsonObject:
         """A material that looks its occlusion up in the lightmap; a copy, all else as it was."""
+        occluded = self._occluded(material, look)
+        bent = self._lightmap.bent
+        if bent is None:
+            return without_bent_normals(occluded)
+        return with_bent_normals(
+            occluded, self._bent_page(bent, look.page), look.uv_set, bent.space
+        )
+
+    def _occluded(self, material: JsonObject, look: Look) -> JsonObject:
         whole = Element(material, str(self._edit.document.path))
         size = self._lightmap.pages[look.page].shape
         if self._orm is not None and not self._orm.objection(whole, look.uv_set, size):
@@ -61,6 +72,18 @@ class PageTextures:
             self._pages[page] = self._edit.append("textures", texture)
         return self._pages[page]
 
+    def _bent_page(self, bent: BentPages, page: int) -> int:
+        """The texture of the bent normals of a page."""
+        from aobake.images import encode  # heavy, as above
+
+        if page not in self._bent:
+            data = encode(bent.image(page), "png", self._settings.encoding)
+            source = self._image(data, "bent_normal")
+            self._bent[page] = self._edit.append(
+                "textures", {"sampler": self._clamped(), "source": source}
+            )
+        return self._bent[page]
+
     def _packed_page(self, orm: OrmImages, material: Element, texture: Texture, page: int) -> int:
         """The texture of a page within a copy of the metallic-roughness image, sampled as that one was."""
         info = material.needed("pbrMetallicRoughness").needed("metallicRoughnessTexture")
@@ -74,13 +97,13 @@ class PageTextures:
             )
         return self._packed[key]
 
-    def _image(self, data: bytes) -> int:
+    def _image(self, data: bytes, what: str = "ao") -> int:
         if self._layout.glb:
             view = self._edit.add_view(data)
             return self._edit.append(
                 "images", {"bufferView": view, "mimeType": "image/png", "name": NAME}
             )
-        path = free_name(self._layout.target, self._edit.document, ".png", self.files)
+        path = free_name(self._layout.target, self._edit.document, ".png", self.files, what)
         self.files[path] = [data]
         return self._edit.append("images", {"uri": urllib.parse.quote(path.name), "name": NAME})
 

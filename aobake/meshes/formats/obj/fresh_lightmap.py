@@ -54,6 +54,7 @@ def fresh_lightmap(
             name,
             () if material is None else _statements(scene.materials[material]),
             _bytes(names.images[page]),
+            _bytes(names.bent[page]) if names.bent else None,
         )
     ]
     return {

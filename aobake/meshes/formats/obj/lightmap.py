@@ -41,6 +41,8 @@ def check_texture(
         _copies(scene.source, target)
         if lightmap is not None:
             _check_textures(scene, lightmap, target)
+    if lightmap is not None:
+        _check_tangents(scene, lightmap, target)
     if image.pack == "orm":
         return (f"{target}: OBJ has its occlusion in an image of its own; only glTF is packed",)
     return ()
@@ -64,6 +66,19 @@ def _check_textures(scene: Scene, lightmap: Lightmap, target: Path) -> None:
         )
 
 
+def _check_tangents(scene: Scene, lightmap: Lightmap, target: Path) -> None:
+    """Directions along tangents mean nothing where a new set takes away the coordinates that those follow."""
+    if lightmap.bent is None or lightmap.bent.space != "tangent":
+        return
+    for (_, mesh), placing in zip(scene.placed(), lightmap.placings, strict=True):
+        old = {"TANGENT", "TEXCOORD_0"} & mesh.attributes.keys()
+        if old and placing is not None and isinstance(placing.layout, Unwrapped):
+            raise OutputError(
+                f"{target}: OBJ has one set of texture coordinates, and the bent normals follow the old one of mesh "
+                f"{mesh.name!r}. Keep it (--uv keep), bake them with --bent-space object, or write GLB."
+            )
+
+
 def write_texture(
     scene: Scene, lightmap: Lightmap, target: Path, image: ImageSettings
 ) -> tuple[Path, ...]:
@@ -79,6 +94,7 @@ def write_texture(
         target,
         ENDINGS.get(image.encoding or "8", ".png"),
         len(lightmap.pages),
+        0 if lightmap.bent is None else len(lightmap.pages),
         {*copies, *(source.files if source else ())},
     )
     texts = (
@@ -96,13 +112,11 @@ def write_texture(
 def _images(lightmap: Lightmap, image: ImageSettings, names: Names) -> dict[Path, bytes]:
     from aobake.images import KINDS, encode  # heavy: a vertex bake does without
 
-    used = {placing.page for placing in lightmap.placings if placing}
-    return {
-        names.images[page]: encode(
-            lightmap.pages[page], KINDS[names.images[page].suffix], image.encoding
-        )
-        for page in sorted(used)
-    }
+    used = sorted({placing.page for placing in lightmap.placings if placing})
+    kept = [(names.images[page], lightmap.pages[page]) for page in used]
+    if lightmap.bent is not None:
+        kept += [(names.bent[page], lightmap.bent.image(page)) for page in used]
+    return {path: encode(pixels, KINDS[path.suffix], image.encoding) for path, pixels in kept}
 
 
 def _patched(
@@ -124,8 +138,9 @@ def _patched(
     changes.sort(key=lambda change: (change.start, change.end))
     library = b"\n".join(path.read_bytes() for path in _libraries(source))
     image = names.images[placing.page].name.encode()
+    bent = names.bent[placing.page].name.encode() if names.bent else None
     return {
-        names.library: with_occlusion(library, materials, image),
+        names.library: with_occlusion(library, materials, image, bent),
         target: spliced(
             text,
             (change.start for change in changes),
