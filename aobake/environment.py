@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.metadata
 import os
 import platform
@@ -9,7 +10,7 @@ import platform
 from aobake import __version__
 from aobake.errors import EngineError
 
-__all__ = ["cache_folder", "machine", "processors", "versions"]
+__all__ = ["cache_folder", "cache_warnings", "machine", "processors", "versions"]
 
 PACKAGES = ("embreex", "numba", "numpy", "scipy", "trimesh", "DracoPy")
 
@@ -20,12 +21,15 @@ def versions() -> dict[str, str]:
     A package or an Embree that is missing is 'missing'; nothing is imported but Embree's interface.
     """
     found = {"aobake": __version__, "python": platform.python_version(), "embree": _embree()}
-    for name in PACKAGES:
-        try:
-            found[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            found[name] = "missing"
-    return found
+    return found | {name: _version_of(name) for name in PACKAGES}
+
+
+@functools.cache  # it takes 1 ms each, as long as a small bake
+def _version_of(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "missing"
 
 
 def machine() -> str:
@@ -42,10 +46,18 @@ def processors() -> int:
 
 def cache_folder() -> str:
     """The folder that keeps compiled kernels, or that they are kept nowhere."""
-    from aobake.tracing import kernels
+    from aobake.tracing import kept
 
-    stats = getattr(kernels.trace, "stats", None)
-    return getattr(stats, "cache_path", None) or "kept nowhere: compiled anew in each process"
+    place = kept.folder()
+    return "kept nowhere: compiled anew in each process" if place is None else str(place)
+
+
+def cache_warnings() -> tuple[str, ...]:
+    """One line where compiled kernels could not be kept, so that every run will be as slow as the first."""
+    from aobake.tracing import kept
+
+    problem = kept.problem()
+    return () if problem is None else (problem,)
 
 
 def _embree() -> str:

@@ -134,7 +134,9 @@ class RenderSettings:
             value = getattr(self, name)
             if not isinstance(value, bool):
                 raise SettingsError(f"{name} is {value!r}; True or False is needed.")
-        if self.background not in get_args(Background) and not HEX_COLOR.fullmatch(self.background):
+        if self.background not in get_args(Background) and not HEX_COLOR.fullmatch(
+            str(self.background)
+        ):
             raise SettingsError(
                 f"background is {self.background!r}; gradient, transparent or a colour such as #ffffff is needed."
             )

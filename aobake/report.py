@@ -30,7 +30,8 @@ __all__ = [
 
 Float32Array = NDArray[np.float32]
 
-SCHEMA = 1  # grows when a key changes its meaning or goes; new keys do not change it
+READING = ("scene", "pose", "root")
+SCHEMA = 2  # grows when a key changes its meaning or goes; new keys do not change it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +75,8 @@ class Report:
 
     findings : what was passed over, mended or is in doubt; warnings : the same and more, for people
 
-    settings : of the bake and of how it is stored; settings_file : the file that some came from
+    settings : of the bake and of how it is stored; settings_files : those that some came from
+    reading : how the asset was read: "scene", "pose" and "root", each None where it was left out
     layout : of a texture, one sentence for each image on where its texture coordinates come from
     points : vertices or texels that were given a value
     ao_mean : their mean, or None where there are none
@@ -87,7 +89,8 @@ class Report:
     inputs: tuple[FileRecord, ...]
     outputs: tuple[FileRecord, ...]
     settings: Mapping[str, object]
-    settings_file: str | None
+    settings_files: tuple[str, ...]
+    reading: Mapping[str, str | None]
     plan: Plan
     layout: tuple[str, ...]
     instances: int
@@ -116,14 +119,15 @@ class Report:
         files.write_files({path: self.to_json().encode("utf-8", "backslashreplace")})
 
 
-def of_bake(
+def of_bake(  # noqa: PLR0913 - what is to be said, part by part
     baked: BakedVertices | BakedTexture,
     *,
     command: str,
     inputs: Sequence[FileRecord],
     outputs: Sequence[FileRecord],
     store: StoreSettings | ImageSettings,
-    settings_file: Path | None = None,
+    settings_files: Sequence[Path] = (),
+    reading: Mapping[str, object] | None = None,
     seconds: Mapping[str, float] | None = None,
     warnings: Sequence[str] = (),
 ) -> Report:
@@ -143,7 +147,8 @@ def of_bake(
         inputs=tuple(inputs),
         outputs=tuple(outputs),
         settings=dataclasses.asdict(baked.settings) | dataclasses.asdict(store),
-        settings_file=None if settings_file is None else str(settings_file),
+        settings_files=tuple(map(str, settings_files)),
+        reading=_words(dict.fromkeys(READING) | dict(reading or {})),
         plan=baked.plan,
         layout=baked.layout if isinstance(baked, BakedTexture) else (),
         instances=len(baked.scene.instances),
@@ -156,11 +161,21 @@ def of_bake(
         error=error_summary(errors),
         tolerance=_tolerance_summary(baked, errors),
         findings=baked.findings,
-        warnings=tuple(dict.fromkeys((*baked.scene.warnings, *baked.warnings, *warnings))),
+        warnings=_each_once(
+            baked.scene.warnings, baked.warnings, warnings, environment.cache_warnings()
+        ),
         versions=here,
         machine=environment.machine(),
         processors=environment.processors(),
     )
+
+
+def _each_once(*lines: Sequence[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(line for some in lines for line in some))
+
+
+def _words(values: Mapping[str, object]) -> dict[str, str | None]:
+    return {name: None if value is None else str(value) for name, value in values.items()}
 
 
 def _values(baked: BakedVertices | BakedTexture) -> tuple[Float32Array, Float32Array]:

@@ -6,9 +6,9 @@ import dataclasses
 from pathlib import Path
 
 from aobake.cli import terminal
-from aobake.cli.config import Configured, configured
 from aobake.cli.options import AtlasFlags, CommonOptions, Output, TraceFlags
 from aobake.cli.output import check_target, make_folder
+from aobake.config import Configured, configured
 
 __all__ = ["demo"]
 
@@ -60,17 +60,28 @@ def demo(
 
 def _bake(folder: Path, chosen: Configured, common: CommonOptions) -> None:
     """The scene with its occlusion at vertices, and with a lightmap."""
-    from aobake.cli.work import Work, bake_texture_to, bake_vertices_to
+    from aobake.cli.work import do_in_memory
     from aobake.demo import hall
+    from aobake.jobs import Job
 
     scene = hall()
-    work = Work(command="demo", output=folder / COLORS, chosen=chosen, common=common)
-    bake_vertices_to(scene, work)
-    common = dataclasses.replace(common, report=None)
     few = dataclasses.replace(chosen.bake, rays=min(chosen.bake.rays, TEXEL_RAYS))
-    chosen = dataclasses.replace(chosen, bake=few)
-    work = Work(command="demo", output=folder / LIGHTMAP, chosen=chosen, common=common)
-    bake_texture_to(scene, work)
+    colors = Job(
+        command="vertex",
+        name="demo",
+        input=folder / COLORS,
+        output=folder / COLORS,
+        chosen=chosen,
+        force=common.force,
+    )
+    lightmap = dataclasses.replace(
+        colors,
+        command="texture",
+        output=folder / LIGHTMAP,
+        chosen=dataclasses.replace(chosen, bake=few),
+    )
+    do_in_memory(scene, colors, common)
+    do_in_memory(scene, lightmap, dataclasses.replace(common, report=None))
 
 
 def _show(folder: Path, chosen: Configured, *, quiet: bool) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import functools
 import inspect
-import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias, TypedDict, get_args, get_type_hints
 
 from aobake.cli.app import Group, Parameter, Token
+from aobake.config import Configured, configured
+from aobake.flags import as_flags, flag_name
 from aobake.render_settings import RenderSettings
 from aobake.settings import (
     AtlasSettings,
@@ -25,7 +27,9 @@ from aobake.settings import (
 
 __all__ = [
     "AtlasFlags",
+    "BakeFlags",
     "CommonOptions",
+    "ConfigOptions",
     "ImageFlags",
     "Output",
     "RenderFlags",
@@ -33,8 +37,7 @@ __all__ = [
     "StoreFlags",
     "TraceFlags",
     "VertexFlags",
-    "as_flags",
-    "flag_name",
+    "flags_of",
 ]
 
 COMMON = Group("Common options", sort_key=5)
@@ -61,6 +64,22 @@ class CommonOptions:
     """Show where in the program an error arose."""
 
 
+@Parameter(name="*", group=COMMON)
+@dataclass(frozen=True, kw_only=True)
+class ConfigOptions:
+    """What is taken from files aobake.toml."""
+
+    preset: str | None = None
+    """Settings by name: those under [preset.NAME] in aobake.toml, unless a pattern there names others."""
+
+    no_config: bool = False
+    """Ignore every aobake.toml."""
+
+    def configured(self, asset: Path, *flags: Mapping[str, object] | None) -> Configured:
+        """The settings for an asset. Raises SettingsError, which names the file or the flag."""
+        return configured(None if self.no_config else asset, *flags, preset=self.preset)
+
+
 @Parameter(name="*", group=SOURCE)
 @dataclass(frozen=True, kw_only=True)
 class SourceOptions:
@@ -76,27 +95,19 @@ class SourceOptions:
     """Folder that the asset's side files may lie in. Left out: the asset's own folder."""
 
 
-def flag_name(field: str) -> str:
-    """The flag of a field of the settings: max_distance -> --max-distance."""
-    return f"--{field.replace('_', '-')}"
-
-
-def as_flags(text: str, settings: type) -> str:
-    """What is said of settings, in the words of the command line: flags, and None as what is left out."""
-    for field in dataclasses.fields(settings):
-        if "_" in field.name:
-            text = re.sub(rf"\b{field.name}\b", flag_name(field.name), text)
-    return re.sub(r"(\()?None:", lambda found: "(left out:" if found[1] else "Left out:", text)
+@functools.cache
+def _classes(module: str) -> list[ast.ClassDef]:
+    """The classes in the source of a module: parsed once for all its settings, 5 ms."""
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except OSError:
+        return []
+    return [node for node in tree.body if isinstance(node, ast.ClassDef)]
 
 
 def field_help(settings: type) -> dict[str, str]:
     """Field -> the docstring below it; empty where the source is not at hand."""
-    try:
-        tree = ast.parse(inspect.getsource(sys.modules[settings.__module__]))
-    except OSError:
-        return {}
-    classes = (node for node in tree.body if isinstance(node, ast.ClassDef))
-    body = next((node.body for node in classes if node.name == settings.__name__), [])
+    body = next((c.body for c in _classes(settings.__module__) if c.name == settings.__name__), [])
     found = {}
     for field, text in pairwise(body):
         match field, text:
@@ -125,11 +136,22 @@ def _number(_hint: object, tokens: Sequence[Token]) -> float | str | None:
         return word
 
 
-def _flags(settings: type, title: str, order: int) -> object:
-    """A TypedDict of the settings' fields: cyclopts fills in those that were given, and no others."""
+def flags_of(*parts: tuple[type, str, int]) -> object:
+    """A TypedDict of the fields of settings: cyclopts fills in those that were given, and no others.
+
+    parts : settings, and the title and the place in the help of their flags
+    """
+    hints = {name: hint for part in parts for name, hint in _hints(*part).items()}
+    flags = TypedDict(parts[0][0].__name__, hints, total=False)  # type: ignore[misc]
+    return Annotated[flags | None, Parameter(name="*")]
+
+
+def _hints(settings: type, title: str, order: int) -> dict[str, object]:
+    """Field -> its type, with the parameter that it is on the command line."""
     helps = field_help(settings)
     group = Group(title, sort_key=order)
-    hints, types = {}, get_type_hints(settings)
+    hints: dict[str, object] = {}
+    types = get_type_hints(settings)
     for field in dataclasses.fields(settings):
         text = as_flags(helps.get(field.name, ""), settings)
         if field.default not in {None, ()}:
@@ -143,8 +165,7 @@ def _flags(settings: type, title: str, order: int) -> object:
             read = _number
         parameter = Parameter(name=flag_name(field.name), group=group, help=text, converter=read)
         hints[field.name] = Annotated[hint, parameter]
-    flags = TypedDict(settings.__name__, hints, total=False)  # type: ignore[misc]
-    return Annotated[flags | None, Parameter(name="*")]
+    return hints
 
 
 if TYPE_CHECKING:
@@ -155,10 +176,14 @@ if TYPE_CHECKING:
     StoreFlags: TypeAlias = Flags
     ImageFlags: TypeAlias = Flags
     RenderFlags: TypeAlias = Flags
+    BakeFlags: TypeAlias = Flags
 else:
-    TraceFlags = _flags(TraceSettings, "Baking", 2)
-    VertexFlags = _flags(VertexSettings, "Baking", 2)
-    AtlasFlags = _flags(AtlasSettings, "Texture", 3)
-    StoreFlags = _flags(StoreSettings, "Writing", 1)
-    ImageFlags = _flags(ImageSettings, "Writing", 1)
-    RenderFlags = _flags(RenderSettings, "Picture", 2)
+    TRACE = (TraceSettings, "Baking", 2)
+    VERTEX = (VertexSettings, "Baking", 2)
+    ATLAS = (AtlasSettings, "Texture", 3)
+    STORE = (StoreSettings, "Writing", 1)
+    IMAGE = (ImageSettings, "Writing", 1)
+    TraceFlags, VertexFlags, AtlasFlags = flags_of(TRACE), flags_of(VERTEX), flags_of(ATLAS)
+    StoreFlags, ImageFlags = flags_of(STORE), flags_of(IMAGE)
+    RenderFlags = flags_of((RenderSettings, "Picture", 2))
+    BakeFlags = flags_of(TRACE, VERTEX, ATLAS, STORE, IMAGE)

@@ -9,9 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from aobake.cli import terminal
 from aobake.cli.app import Parameter
-from aobake.cli.config import configured
 from aobake.cli.leaving import leaving_promptly
-from aobake.cli.options import COMMON, AtlasFlags, SourceOptions, TraceFlags, VertexFlags
+from aobake.cli.options import (
+    COMMON,
+    AtlasFlags,
+    ConfigOptions,
+    SourceOptions,
+    TraceFlags,
+    VertexFlags,
+)
 
 if TYPE_CHECKING:
     from aobake import Plan
@@ -22,7 +28,7 @@ __all__ = ["plan"]
 FILLED = 0.6  # of an image, that charts usually cover
 
 
-def plan(
+def plan(  # noqa: PLR0913 - one for each group of flags
     input: Path,
     /,
     *,
@@ -31,6 +37,7 @@ def plan(
     vertices: VertexFlags = None,
     atlas: AtlasFlags = None,
     trace: TraceFlags = None,
+    config: ConfigOptions = ConfigOptions(),  # noqa: B008 - frozen
     source: SourceOptions = SourceOptions(),  # noqa: B008 - frozen
     debug: Annotated[bool, Parameter(group=COMMON)] = False,  # noqa: ARG001 - seen by run()
 ) -> int:
@@ -50,7 +57,7 @@ def plan(
     debug:
         Show where in the program an error arose.
     """
-    chosen = configured(input, trace, vertices, atlas).bake
+    chosen = config.configured(input, trace, vertices, atlas).bake
 
     from aobake import load
     from aobake.plan import plan as vertex_plan

@@ -11,11 +11,19 @@ from typing import TYPE_CHECKING, Annotated
 
 from aobake.cli import terminal
 from aobake.cli.app import Group, Parameter
-from aobake.cli.config import configured, in_flags, rendering
 from aobake.cli.leaving import leaving_promptly
-from aobake.cli.options import CommonOptions, Output, RenderFlags, SourceOptions, TraceFlags
+from aobake.cli.options import (
+    CommonOptions,
+    ConfigOptions,
+    Output,
+    RenderFlags,
+    SourceOptions,
+    TraceFlags,
+)
 from aobake.cli.output import check_target
+from aobake.config import rendering
 from aobake.errors import InputError, SettingsError, nearest
+from aobake.flags import in_flags
 from aobake.render_settings import RenderSettings
 from aobake.settings import Encoding
 
@@ -33,17 +41,17 @@ WRITING = Group("Writing", sort_key=1)
 class _Wanted:
     """What is to be drawn: one picture, or a comparison.
 
-    settings_file : the aobake.toml that some of it came from
+    settings_files : the aobake.toml files that some of it came from
     """
 
     picture: RenderSettings
     bake: BakeSettings
     compare: str | None
     encoding: Encoding | None
-    settings_file: Path | None
+    settings_files: tuple[Path, ...]
 
 
-def render(
+def render(  # noqa: PLR0913 - one for each group of flags
     input: Path,
     /,
     *,
@@ -52,6 +60,7 @@ def render(
     compare: Annotated[str | None, Parameter(group=WRITING)] = None,
     picture: RenderFlags = None,
     trace: TraceFlags = None,
+    config: ConfigOptions = ConfigOptions(),  # noqa: B008 - frozen
     source: SourceOptions = SourceOptions(),  # noqa: B008 - frozen
     common: CommonOptions = CommonOptions(),  # noqa: B008 - frozen
 ) -> int:
@@ -74,13 +83,13 @@ def render(
         Pictures side by side on one sheet: ao (a constant ambient term beside ambient occlusion), models
         (every local model), or rays=16,64,256 (bakes with so many rays).
     """
-    chosen = configured(input, trace)
+    chosen = config.configured(input, trace)
     wanted = _Wanted(
-        picture=rendering(input, picture),
+        picture=rendering(None if config.no_config else input, picture),
         bake=chosen.bake,
         compare=compare,
         encoding=encoding,
-        settings_file=chosen.file,
+        settings_files=chosen.files,
     )
     _check(wanted, output)
     check_target(output, force=common.force, inputs=[input])
@@ -191,7 +200,7 @@ def _report(
         "command": "render",
         **{kind: [vars(record) for record in records] for kind, records in files.items()},
         "settings": settings | {"compare": wanted.compare, "encoding": wanted.encoding},
-        "settings_file": None if wanted.settings_file is None else str(wanted.settings_file),
+        "settings_files": [str(file) for file in wanted.settings_files],
         "plan": {"effects": _plain(drawn.effects)},
         "seconds": {stage: round(spent, 6) for stage, spent in seconds.items()},
         "warnings": list(drawn.warnings),

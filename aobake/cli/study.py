@@ -8,9 +8,8 @@ from pathlib import Path
 from aobake import SettingsError
 from aobake.cli import terminal
 from aobake.cli.app import Parameter
-from aobake.cli.config import configured
 from aobake.cli.leaving import leaving_promptly
-from aobake.cli.options import COMMON, Output, SourceOptions, TraceFlags
+from aobake.cli.options import COMMON, ConfigOptions, Output, SourceOptions, TraceFlags
 from aobake.cli.output import check_target, make_folder
 
 __all__ = ["study"]
@@ -57,6 +56,7 @@ def study(
     output: Output,
     extent: ExtentOptions = ExtentOptions(),
     trace: TraceFlags = None,
+    config: ConfigOptions = ConfigOptions(),  # noqa: B008 - frozen
     source: SourceOptions = SourceOptions(),  # noqa: B008 - frozen
     common: StudyOptions = StudyOptions(),
 ) -> int:
@@ -74,7 +74,7 @@ def study(
     output:
         The folder to write into; it is made if needed.
     """
-    chosen = configured(input, trace).bake
+    chosen = config.configured(input, trace).bake
 
     from aobake import load
     from aobake.study import (

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from aobake.cli.config import configured
 from aobake.cli.options import (
     AtlasFlags,
     CommonOptions,
+    ConfigOptions,
     ImageFlags,
     Output,
     SourceOptions,
@@ -26,6 +26,7 @@ def texture(
     image: ImageFlags = None,
     trace: TraceFlags = None,
     atlas: AtlasFlags = None,
+    config: ConfigOptions = ConfigOptions(),  # noqa: B008 - frozen
     source: SourceOptions = SourceOptions(),  # noqa: B008 - frozen
     common: CommonOptions = CommonOptions(),  # noqa: B008 - frozen
 ) -> int:
@@ -36,7 +37,7 @@ def texture(
     (map_Ka and map_ao), or the image alone (PNG, EXR, TIFF). Everything else in
     the asset stays as it is.
 
-    Defaults can be set in a file aobake.toml beside the input or in a folder
+    Defaults can be set in files aobake.toml beside the input and in folders
     above it: one setting a line, named as below with underscores, such as
     padding = 8. Flags have the last word.
 
@@ -49,7 +50,7 @@ def texture(
     """
     from aobake.meshes.formats import IMAGES, TEXTURE_WRITABLE
 
-    chosen = configured(input, trace, atlas, image)
+    chosen = config.configured(input, trace, atlas, image)
     check_asset_target(
         output,
         (*TEXTURE_WRITABLE, *IMAGES),
@@ -60,8 +61,19 @@ def texture(
     if common.report is not None:
         check_target(common.report, force=common.force)
 
-    from aobake.cli.work import Work, bake_texture_to, opened
+    from aobake.cli.work import as_read, do
+    from aobake.jobs import Job
 
-    work = Work(command="texture", output=output, chosen=chosen, common=common)
-    bake_texture_to(opened(input, source, work), work)
+    reading = as_read(source)
+    do(
+        Job(
+            command="texture",
+            input=input,
+            output=output,
+            chosen=chosen,
+            reading=reading,
+            force=common.force,
+        ),
+        common,
+    )
     return 0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from aobake.cli.config import configured
 from aobake.cli.options import (
     CommonOptions,
+    ConfigOptions,
     Output,
     SourceOptions,
     StoreFlags,
@@ -26,6 +26,7 @@ def vertex(
     store: StoreFlags = None,
     vertices: VertexFlags = None,
     trace: TraceFlags = None,
+    config: ConfigOptions = ConfigOptions(),  # noqa: B008 - frozen
     source: SourceOptions = SourceOptions(),  # noqa: B008 - frozen
     common: CommonOptions = CommonOptions(),  # noqa: B008 - frozen
 ) -> int:
@@ -34,7 +35,7 @@ def vertex(
     Reads glTF, GLB, OBJ, PLY, USD, STL, OFF, 3MF and DAE; writes glTF, GLB,
     OBJ, PLY and USD layers. Everything else in the asset stays as it is.
 
-    Defaults can be set in a file aobake.toml beside the input or in a folder
+    Defaults can be set in files aobake.toml beside the input and in folders
     above it: one setting a line, named as below with underscores, such as
     max_rays = 1024. Flags have the last word.
 
@@ -47,13 +48,24 @@ def vertex(
     """
     from aobake.meshes.formats import WRITABLE
 
-    chosen = configured(input, trace, vertices, store)
+    chosen = config.configured(input, trace, vertices, store)
     check_asset_target(output, WRITABLE, "ambient occlusion", force=common.force, inputs=[input])
     if common.report is not None:
         check_target(common.report, force=common.force)
 
-    from aobake.cli.work import Work, bake_vertices_to, opened
+    from aobake.cli.work import as_read, do
+    from aobake.jobs import Job
 
-    work = Work(command="vertex", output=output, chosen=chosen, common=common)
-    bake_vertices_to(opened(input, source, work), work)
+    reading = as_read(source)
+    do(
+        Job(
+            command="vertex",
+            input=input,
+            output=output,
+            chosen=chosen,
+            reading=reading,
+            force=common.force,
+        ),
+        common,
+    )
     return 0

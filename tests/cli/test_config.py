@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
 from aobake import SettingsError
-from aobake.cli.config import configured, rendering
+from aobake.config import configured, rendering
 from tests.conftest import Run
 from tests.support import one_line
 
@@ -24,15 +25,29 @@ def test_defaults_then_the_file_then_flags(tmp_path: Path) -> None:
     chosen = configured(tmp_path / "a.glb", {"rays": 16}, None)
     assert (chosen.bake.rays, chosen.bake.seed, chosen.bake.max_rays) == (16, 5, 4096)
     assert chosen.store.store == "attribute"
-    assert chosen.file == file
+    assert chosen.files == (file,)
 
 
-def test_the_nearest_file_counts_alone(tmp_path: Path) -> None:
-    write(tmp_path, "rays = 64\nseed = 5\n")
+def test_every_file_above_contributes_and_the_nearest_has_the_last_word(tmp_path: Path) -> None:
+    far = write(tmp_path, "rays = 64\nseed = 5\n")
     near = write(tmp_path / "props" / "chairs", "rays = 32\n")
     chosen = configured(tmp_path / "props" / "chairs" / "a.glb", {})
-    assert (chosen.bake.rays, chosen.bake.seed, chosen.file) == (32, 0, near)
-    assert configured(tmp_path / "props" / "a.glb").bake.seed == 5
+    assert (chosen.bake.rays, chosen.bake.seed) == (32, 5)
+    assert chosen.files == (far, near)
+    assert configured(tmp_path / "props" / "a.glb").files == (far,)
+
+
+def test_a_file_can_be_the_topmost(tmp_path: Path) -> None:
+    write(tmp_path, "rays = 64\nseed = 5\n")
+    near = write(tmp_path / "props", "root = true\nrays = 32\n")
+    chosen = configured(tmp_path / "props" / "chairs" / "a.glb", {})
+    assert (chosen.bake.rays, chosen.bake.seed, chosen.files) == (32, 0, (near,))
+
+
+def test_what_is_beside_the_way_to_the_asset_does_not_count(tmp_path: Path) -> None:
+    write(tmp_path / "here", "rays = 64\n")
+    (tmp_path / "there").mkdir()
+    assert configured(tmp_path / "here" / ".." / "there" / "a.glb").bake.rays == 256
 
 
 def test_a_relative_asset_is_looked_up_from_where_we_are(
@@ -76,6 +91,20 @@ def test_a_mistake_in_the_file_names_the_file(
     assert ran.status == 2
     assert one_line(ran.err, "aobake.toml", *parts), ran.err
     assert not (tmp_path / "out.obj").exists()
+
+
+def test_a_report_holds_all_that_it_takes_to_repeat_a_bake(
+    run: Run, corner: Path, tmp_path: Path
+) -> None:
+    file = write(tmp_path, "rays = 3\n")
+    report = tmp_path / "r.json"
+    arguments = ["-o", tmp_path / "out.obj", "--root", tmp_path, "--report", report]
+    assert run("vertex", corner, *arguments).status == 0
+    data = json.loads(report.read_text(encoding="utf-8"))
+    assert data["schema"] == 2
+    assert data["settings"]["rays"] == 3
+    assert data["settings_files"] == [str(file)]
+    assert data["reading"] == {"scene": None, "pose": None, "root": str(tmp_path)}
 
 
 def test_pictures_have_a_table_of_their_own(tmp_path: Path) -> None:

@@ -151,7 +151,6 @@ def test_an_error_nobody_thought_of_is_one_line_too(
         raise ZeroDivisionError("division\nby zero")
 
     monkeypatch.setattr("aobake.bake.bake_vertices", broken)
-    monkeypatch.setattr("aobake.cli.work.bake_vertices", broken, raising=False)
     ran = run("vertex", corner, "-o", tmp_path / "out.glb")
     assert ran.status == 1
     assert one_line(ran.err, "ZeroDivisionError", "--debug", "corner.obj"), ran.err
