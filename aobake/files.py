@@ -6,14 +6,26 @@ import contextlib
 import hashlib
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from aobake.errors import InputError, OutputError
 
-__all__ = ["Content", "check_writable", "read_bytes", "same_file", "sha256", "write_files"]
+__all__ = [
+    "PART",
+    "Content",
+    "check_writable",
+    "read_bytes",
+    "same_file",
+    "sha256",
+    "write_files",
+]
 
-Content = bytes | bytearray | memoryview | Sequence[bytes | bytearray | memoryview]
+# How the names of files begin that are not complete yet; they end in ".part". It differs from process to
+# process, on one machine or several, so that what a killed one left can be told from its neighbours' work.
+PART = f".aobake-{os.urandom(4).hex()}-"
+
+Content = bytes | bytearray | memoryview | Iterable[bytes | bytearray | memoryview]
 
 
 def read_bytes(path: Path, needed_by: str | None = None) -> bytes:
@@ -65,19 +77,23 @@ def check_writable(path: Path) -> None:
         )
 
 
-def write_files(files: Mapping[Path, Content]) -> None:
+def write_files(files: Mapping[Path, Content], *, sync: bool = True) -> None:
     """Write several files so that each appears whole, the last one of the mapping last.
 
     All are written beside their targets under other names first and are moved into place only when
     every one of them is complete: whatever fails, no target is half-written and no stray file stays.
-    Existing targets are replaced. Raises OutputError.
+    Existing targets are replaced. A content in pieces is asked for one piece after the other, and may be
+    made meanwhile.
+
+    sync : whether to wait until the disk has them, milliseconds each; not for thousands that can be made again
+    Raises OutputError.
     """
     staged: list[tuple[str, Path]] = []
     target: Path | None = None
     try:
         for target, content in files.items():
             check_writable(target)
-            staged.append((_stage(target, content), target))
+            staged.append((_stage(target, content, sync), target))
         for temporary, target in staged:
             os.replace(temporary, target)
     except OSError as error:
@@ -89,15 +105,16 @@ def write_files(files: Mapping[Path, Content]) -> None:
                 os.unlink(temporary)
 
 
-def _stage(target: Path, content: Content) -> str:
+def _stage(target: Path, content: Content, sync: bool) -> str:
     pieces = [content] if isinstance(content, bytes | bytearray | memoryview) else content
-    handle, name = tempfile.mkstemp(prefix=".aobake-", suffix=".part", dir=target.parent)
+    handle, name = tempfile.mkstemp(prefix=PART, suffix=".part", dir=target.parent)
     try:
         with os.fdopen(handle, "wb") as stream:
             for piece in pieces:
                 stream.write(piece)
             stream.flush()
-            os.fsync(stream.fileno())
+            if sync:
+                os.fsync(stream.fileno())
         os.chmod(name, _mode(target))
     except BaseException:
         os.unlink(name)

@@ -27,9 +27,10 @@ LAYERS = (
     ("atlas",),
     ("shading",),
     (
-        "plan", "planning", "bake", "texels", "lightmaps", "previews", "results", "environment", "study",
+        "plan", "planning", "bake", "bands", "bent_texels", "texel_samples", "texels", "pages", "lightmaps", "previews", "results", "environment", "study",
         "report", "demo", "viewer", "__init__",
     ),
+    ("flags", "patterns", "config_file", "config", "jobs"),
     ("batch",),
     ("cli", "__main__"),
 )  # fmt: skip

@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-__all__ = ["Progress", "Section", "error", "progress_bar", "reset", "say", "tables", "warn"]
+__all__ = [
+    "Draw",
+    "Progress",
+    "Section",
+    "error",
+    "live_lines",
+    "note",
+    "progress_bar",
+    "reset",
+    "say",
+    "tables",
+    "warn",
+]
 
 Progress = Callable[[str, int, int], None]
 """Called with the stage, what is done of it, and all there is to do."""
+
+Draw = Callable[[float, Sequence[str]], None]
+"""Called with the share that is done, in [0, 1], and lines of text to stand below its bar."""
 
 Section = tuple[str, Mapping[str, str]]
 """A title, and what is said under it: name -> value."""
 
 MOST_WARNINGS = 10
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
 
 def error(message: str) -> None:
@@ -29,6 +46,11 @@ def warn(messages: Sequence[str], more: str) -> None:
         _to_stderr("warning", message)
     if len(shown) < len(messages):
         _to_stderr("warning", f"and {len(messages) - len(shown)} more{more}.")
+
+
+def note(message: str) -> None:
+    """One line on stderr that is no trouble."""
+    _to_stderr("", message)
 
 
 def say(*lines: str) -> None:
@@ -63,6 +85,32 @@ def progress_bar(*, quiet: bool) -> Iterator[Progress | None]:
         yield advance
 
 
+@contextlib.contextmanager
+def live_lines() -> Iterator[Draw | None]:
+    """A bar and some lines at the foot of the terminal on stderr, which vanish at the end; None elsewhere.
+
+    Whatever is written to stderr meanwhile stands above them, and stays.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console, Group
+    from rich.live import Live
+    from rich.padding import Padding
+    from rich.progress_bar import ProgressBar
+    from rich.text import Text
+
+    console = Console(stderr=True)
+    with Live(console=console, transient=True, auto_refresh=False, redirect_stdout=False) as live:
+
+        def draw(share: float, lines: Sequence[str]) -> None:
+            texts = [Text(_one_line(line), no_wrap=True, overflow="ellipsis") for line in lines]
+            bar = Padding(ProgressBar(total=1.0, completed=share), 0)  # by itself it ends no line
+            live.update(Group(bar, *texts), refresh=True)
+
+        yield draw
+
+
 def tables(sections: Sequence[Section]) -> None:
     """Names and values on stdout: as tables on a terminal, else as `title.name: value`, one a line."""
     if not sys.stdout.isatty():
@@ -94,9 +142,10 @@ def reset() -> None:
 def _to_stderr(kind: str, message: str) -> None:
     # A closed stderr must not turn one problem into two.
     with contextlib.suppress(OSError, ValueError):
-        sys.stderr.write(f"aobake: {kind}: {_one_line(message)}\n")
+        sys.stderr.write(f"aobake: {kind}{': ' if kind else ''}{_one_line(message)}\n")
         sys.stderr.flush()
 
 
 def _one_line(message: str) -> str:
-    return " ".join(message.splitlines())
+    r"""On one line, with what could steer a terminal spelled, such as \x1b: names of files may hold it."""
+    return _CONTROL.sub(lambda found: ascii(found[0])[1:-1], " ".join(message.splitlines()))

@@ -96,6 +96,10 @@ def _read(image: Image, longest: int, srgb: bool) -> Float32Array:
     from aobake.shading.tone import from_srgb
 
     stored = decode(image.data(), image.name)
+    step = max(
+        1, max(stored.shape[:2]) // (2 * longest)
+    )  # far more pixels than show are not all read
+    stored = stored[::step, ::step]
     pixels = np.ones((*stored.shape[:2], 4), np.float32)
     grey = stored.shape[2] < 3
     pixels[..., :3] = stored[..., :1] if grey else stored[..., :3]

@@ -13,7 +13,7 @@ from aobake import __version__
 from aobake.errors import OutputError
 from aobake.meshes.formats.gltf.container import Bytes
 
-__all__ = ["page_of"]
+__all__ = ["page_of", "shared_scripts"]
 
 DRACO = b"KHR_draco_mesh_compression"
 MOST_BYTES = (
@@ -21,13 +21,17 @@ MOST_BYTES = (
 )  # browsers hold a text of half a gigabyte, and base64 makes four bytes of three
 
 
-def page_of(glb: Bytes, name: str, facts: Sequence[str] = ()) -> bytes:
+def page_of(
+    glb: Bytes, name: str, facts: Sequence[str] = (), *, scripts_in: str | None = None
+) -> bytes:
     """A page that shows a GLB with its ambient occlusion on, off and alone, and asks the network for nothing.
 
     glb : with everything in it, as packed_glb gives it
     name : title of the page, any text
     facts : what to say below it, each a few words
-    Returns the HTML file. Its policy forbids every request and every script but its own.
+    scripts_in : the folder of shared_scripts(), relative to the page and with a slash at its end, so that many
+        pages can share them; '' is the page's own. None: they are in the page itself
+    Returns the HTML file. Its policy forbids every request and every script but these.
     Raises OutputError for a GLB of more than 256 MiB, which browsers could not open.
     """
     if len(glb) > MOST_BYTES:
@@ -36,19 +40,28 @@ def page_of(glb: Bytes, name: str, facts: Sequence[str] = ()) -> bytes:
             "Use smaller textures, or compress it."
         )
     parts = ["draco", "viewer"] if DRACO in _json_of(glb) else ["viewer"]
-    scripts = [_vendored(f"{part}.min.js") for part in parts]
     style = _text("page.css")
+    scripts, allowed = _scripts(parts, scripts_in)
+    licences = [_vendored(f"{part}.licences.txt") for part in parts if scripts_in is None]
     text = string.Template(_text("page.html")).substitute(
-        policy=html.escape(_policy(scripts, style)),
+        policy=html.escape(_policy(allowed, style)),
         version=html.escape(__version__),
         name=html.escape(name),
         facts=html.escape(" · ".join(facts)),
         style=style,
-        licences="\n".join(_vendored(f"{part}.licences.txt") for part in parts),
+        licences="\n".join(licences),
         asset=base64.b64encode(glb).decode("ascii"),
-        scripts="\n".join(f"<script>{script}</script>" for script in scripts),
+        scripts="\n".join(scripts),
     )
     return text.encode("utf-8", "replace")  # a name may hold what is no character
+
+
+def shared_scripts() -> dict[str, bytes]:
+    """Name -> content of the scripts of pages that do not carry them, each with its licences."""
+    return {
+        f"{part}.min.js": f"/*\n{_vendored(f'{part}.licences.txt')}*/\n{_vendored(f'{part}.min.js')}".encode()
+        for part in ("draco", "viewer")
+    }
 
 
 def _json_of(glb: Bytes) -> bytes:
@@ -56,11 +69,20 @@ def _json_of(glb: Bytes) -> bytes:
     return bytes(glb[20 : 20 + int.from_bytes(glb[12:16], "little")])
 
 
+def _scripts(parts: Sequence[str], folder: str | None) -> tuple[list[str], list[str]]:
+    """The elements of the scripts, and what the policy has to allow for them."""
+    if folder is None:
+        code = [_vendored(f"{part}.min.js") for part in parts]
+        return [f"<script>{script}</script>" for script in code], [_hash(script) for script in code]
+    # A file beside the page is the page's own, also where it is opened from a disk.
+    sources = [html.escape(f"{folder}{part}.min.js") for part in parts]
+    return [f'<script src="{source}"></script>' for source in sources], ["'self'"]
+
+
 def _policy(scripts: Sequence[str], style: str) -> str:
     """What the page may do: run these scripts and their WebAssembly, and show images of its own making."""
-    allowed = " ".join(_hash(script) for script in scripts)
     return (
-        f"default-src 'none'; script-src {allowed} 'wasm-unsafe-eval'; style-src {_hash(style)}; "
+        f"default-src 'none'; script-src {' '.join(scripts)} 'wasm-unsafe-eval'; style-src {_hash(style)}; "
         "img-src blob: data:; base-uri 'none'; form-action 'none'"
     )
 

@@ -12,7 +12,15 @@ from pathlib import Path
 
 from aobake.errors import InputError
 
-__all__ = ["SideFile", "data_bytes", "data_uri", "find", "is_data", "names_host"]
+__all__ = [
+    "SideFile",
+    "data_bytes",
+    "data_uri",
+    "find",
+    "is_data",
+    "names_host",
+    "spellings",
+]
 
 # One letter and a colon is a drive of Windows, and so a path.
 SCHEME = re.compile(r"^\s*(?:[A-Za-z][A-Za-z0-9+.-]+:|[/\\]{2})")
@@ -73,17 +81,23 @@ def data_uri(pieces: bytes, kind: str = "application/octet-stream") -> str:
     return f"data:{kind};base64," + base64.b64encode(pieces).decode("ascii")
 
 
+def spellings(uri: str) -> tuple[str, ...]:
+    """The names that a relative URI may stand for, the likeliest first: percent-decoded, as it stands, and
+    with backslashes read as slashes.
+    """
+    decoded = urllib.parse.unquote(uri)
+    return tuple(dict.fromkeys((decoded, uri, decoded.replace("\\", "/"))))
+
+
 def find(uri: str, folder: Path, root: Path | None) -> SideFile | None:
     """The file that a relative URI names, seen from the folder of the asset.
 
     root : a folder whose files are allowed as well
-    Returns None where the text can name no file. The name is tried percent-decoded, then as it
-    stands, then with backslashes read as slashes; the first that exists is taken, else the first.
+    Returns None where the text can name no file. Of its spellings the first that exists is taken, else
+    the first.
     """
     first = None
-    for name in dict.fromkeys(
-        (urllib.parse.unquote(uri), uri, urllib.parse.unquote(uri).replace("\\", "/"))
-    ):
+    for name in spellings(uri):
         try:
             found = _side_file(name, folder, root)
             if found.exists:

@@ -9,7 +9,7 @@ from pathlib import Path
 from aobake.errors import InputError
 from aobake.files import read_bytes
 
-__all__ = ["Beside", "Statement", "side_files", "texture_bytes"]
+__all__ = ["Beside", "Statement", "library_names", "side_files", "texture_bytes", "texture_names"]
 
 MOST_LIBRARY_BYTES = 1 << 26  # a material library is a few kilobytes of text
 TEXTURES = ("map_", "bump", "disp", "decal", "refl", "norm")
@@ -58,11 +58,10 @@ def side_files(path: Path, libraries: Iterable[bytes], root: Path | None) -> Bes
             read = _statements(path, library, warnings)
             statements += read
             for statement in read:
-                if not statement.keyword.startswith(TEXTURES) or not statement.rest:
-                    continue
-                image = _within(path, statement.rest, root, warnings)
-                if image is not None:
-                    found[image] = None
+                if _names_texture(statement):
+                    image = _within(path, statement.rest, root, warnings)
+                    if image is not None:
+                        found[image] = None
     return Beside(tuple(found), tuple(statements), tuple(warnings))
 
 
@@ -74,6 +73,22 @@ def texture_bytes(path: Path, name: str, root: Path | None) -> bytes:
         finding = next(iter(warnings), f"{name}: there is no such file.")
         raise InputError(f"{path}: texture {finding} Put it beside the asset.")
     return read_bytes(image, str(path))
+
+
+def library_names(statement: bytes) -> tuple[str, ...]:
+    """The names that an mtllib statement may mean: its whole text, and each word of it."""
+    whole = _decoded(statement)
+    return tuple(dict.fromkeys((whole, *whole.split())))
+
+
+def texture_names(library: bytes) -> tuple[str, ...]:
+    """The textures that the text of a material library names."""
+    statements = (_statement(line) for line in library.splitlines() if line.strip())
+    return tuple(dict.fromkeys(s.rest for s in statements if _names_texture(s)))
+
+
+def _names_texture(statement: Statement) -> bool:
+    return statement.keyword.startswith(TEXTURES) and bool(statement.rest)
 
 
 def _library_names(folder: Path, text: bytes) -> list[str]:

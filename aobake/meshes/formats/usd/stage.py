@@ -31,7 +31,7 @@ from aobake.meshes.formats.usd.prims import (
 from aobake.meshes.formats.usd.source import Binding
 from aobake.meshes.scene import FloatArray
 
-__all__ = ["colors_of", "layer_over", "opened"]
+__all__ = ["colors_of", "layer_names", "layer_over", "opened"]
 
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 MARK = "aobake"  # in the custom data of the layers that aobake writes
@@ -68,6 +68,16 @@ def opened(path: Path) -> Opened:
         about=about,
         was_baked=was_baked,
     )
+
+
+def layer_names(path: Path) -> tuple[str, ...]:
+    """The layers that a layer is made of, as it names them; () for what the library cannot read."""
+    with _listening([]):
+        try:
+            layer = Sdf.Layer.OpenAsAnonymous(str(path.resolve()))  # past the library's own cache
+        except Tf.ErrorException:
+            return ()
+        return () if layer is None else tuple(sorted(layer.GetCompositionAssetDependencies()))
 
 
 def colors_of(path: Path, bindings: Sequence[Binding]) -> list[Colors | None]:
