@@ -6,11 +6,9 @@ import contextlib
 import os
 import pickle
 import re
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -19,6 +17,7 @@ from pathlib import Path
 from typing import IO
 
 from aobake.batch.limits import bytes_held
+from aobake.batch.scratch import make_scratch
 from aobake.batch.tasks import Outcome, Task
 from aobake.batch.worker import Ready
 from aobake.errors import EngineError
@@ -62,11 +61,11 @@ class Child:
 
         tell : is called with all that it answers, in a thread of its own
         """
-        self._folder = tempfile.mkdtemp(prefix="aobake-")
+        self._scratch = make_scratch()
         try:
-            self._process = _started(command, self._folder)
+            self._process = _started(command, self._scratch.folder)
         except OSError as error:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._scratch.remove()
             raise EngineError(f"{command[0]}: no process can be started ({error}).") from error
         self._words: deque[str] = deque(maxlen=LAST_WORDS)
         self._threads = [
@@ -114,7 +113,7 @@ class Child:
             thread.join(END_S)
         with contextlib.suppress(OSError):  # a task that it never took
             _pipe(self._process.stdin).close()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._scratch.remove()
         return True
 
     def died_of(self) -> str:

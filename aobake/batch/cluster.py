@@ -80,19 +80,18 @@ class ClusterExecutor:
         """
         _refuse(address)
         self._address = address
-        self._quiet = contextlib.ExitStack()
-        self._quiet.enter_context(_silent())
-        self._client = _connected(address, patience)
         self._batch = secrets.token_hex(8)
         self._sent: dict[str, _Sent] = {}
         self._ended: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._stopping = False
-        self._roster = Roster(self._client, address)
-        try:
+        self._is_gone = False  # the scheduler
+        with contextlib.ExitStack() as done:
+            done.enter_context(_silent())
+            self._client = _connected(address, patience)
+            done.callback(self._leave)
+            self._roster = Roster(self._client, address)
             self._roster.await_first(patience)
-        except BaseException:
-            self.close()
-            raise
+            self._done = done.pop_all()
 
     @property
     def capacity(self) -> Capacity:
@@ -130,7 +129,7 @@ class ClusterExecutor:
             key=key,
             pure=False,
             workers=[worker] if worker else None,
-            allow_other_workers=worker is not None,  # where that one is lost
+            allow_other_workers=bool(worker),  # where that one is lost
         )
         self._sent[key] = _Sent(key, task, future, worker)
         self._await(self._sent[key])
@@ -152,6 +151,8 @@ class ClusterExecutor:
             if outcome is not None:
                 self._forget(key)
                 outcomes.append(outcome)
+        if self._is_gone and not outcomes:
+            raise gone(self._address)
         return outcomes
 
     def stop(self, grace: float) -> Sequence[Outcome]:
@@ -170,14 +171,7 @@ class ClusterExecutor:
 
     def close(self) -> None:
         """Leave the cluster. Its workers stay; what they were doing for this batch is ended."""
-        with contextlib.suppress(Exception):
-            if self._sent:
-                self._everywhere(end, self._batch)
-            for key in list(self._sent):
-                self._forget(key)
-            self._everywhere(retire)
-        self._client.close(timeout=CLOSE_S)
-        self._quiet.close()
+        self._done.close()
 
     def __enter__(self) -> Self:
         return self
@@ -190,6 +184,14 @@ class ClusterExecutor:
     ) -> None:
         self.close()
 
+    def _leave(self) -> None:
+        if self._sent:
+            self._everywhere(end, self._batch)
+        for key in list(self._sent):
+            self._forget(key)
+        self._everywhere(retire)
+        self._client.close(timeout=CLOSE_S)
+
     def _await(self, sent: _Sent) -> None:
         sent.future.add_done_callback(lambda _: self._ended.put(sent.key))
 
@@ -200,19 +202,22 @@ class ClusterExecutor:
         return outcomes
 
     def _outcome(self, sent: _Sent) -> Outcome | None:
-        """What became of a task; None where it is under way again, since its worker was lost at the end."""
+        """What became of a task; None where it is under way again, or the scheduler is gone."""
         status = sent.future.status
         if status == "finished":
             try:
                 return sent.future.result(timeout=GATHER_S)
-            except TimeoutError:
+            except TimeoutError:  # its worker was lost at the end, so it is baked again
                 self._await(sent)
                 return None
+            except Exception as error:  # noqa: BLE001 - the same, and it ended otherwise this time
+                return _lost(sent.task, error)
         if status == "error":
             return _lost(sent.task, sent.future.exception())
         if self._stopping:
             return _failed(sent.task, "stopped", "the batch was stopped before it was done.")
-        raise gone(self._address)
+        self._is_gone = True
+        return None
 
     def _forget(self, key: str) -> None:
         sent = self._sent.pop(key)
@@ -234,15 +239,16 @@ def _probe(folder: Path | None, content: str) -> Iterator[str]:
         yield ""
         return
     try:
-        with tempfile.NamedTemporaryFile(
+        file = tempfile.NamedTemporaryFile(  # noqa: SIM115 - below, where errors are others
             "w", prefix=".aobake-", suffix=".part", dir=folder, encoding="ascii"
-        ) as file:
-            file.write(content)
-            file.flush()
-            yield file.name
+        )
     except OSError as error:
         why = error.strerror or error
         raise OutputError(f"{folder}: nothing can be written there ({why}).") from error
+    with file:
+        file.write(content)
+        file.flush()
+        yield file.name
 
 
 def _refuse(address: str) -> None:
@@ -284,9 +290,8 @@ def _knock(address: str, patience: float) -> None:
         comm = await connect(address, timeout=patience, **arguments)
         await comm.close()
 
-    with ThreadPoolExecutor(
-        1
-    ) as apart:  # this thread may have a loop of its own, as a notebook does
+    # This thread may have a loop of its own, as that of a notebook does.
+    with ThreadPoolExecutor(1) as apart:
         apart.submit(asyncio.run, knock()).result()
 
 

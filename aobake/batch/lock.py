@@ -23,7 +23,7 @@ from pathlib import Path
 
 from aobake.errors import OutputError
 
-__all__ = ["BEAT_S", "STALE_S", "Owner", "hold"]
+__all__ = ["BEAT_S", "STALE_S", "Owner", "hold", "system_lock"]
 
 BEAT_S = 20.0  # how often the owner shows that it lives, by the time of change of the file
 STALE_S = 300.0  # an owner on another machine that showed nothing for so long is gone
@@ -86,7 +86,7 @@ def hold(path: Path, *, command: str) -> Iterator[Owner]:
 
 def _take(handle: int, path: Path) -> None:
     """Raise OutputError unless the lock is free or its owner is gone."""
-    locked = _system_lock(handle)
+    locked = system_lock(handle)
     owner = _owner(handle)
     if locked is False:
         raise OutputError(_refusal(path, owner, "Wait for it, or end it."))
@@ -140,8 +140,8 @@ def _beat(handle: int, path: Path, owner: Owner, ended: threading.Event) -> None
 if sys.platform == "win32":
     import msvcrt
 
-    def _system_lock(handle: int) -> bool | None:
-        """Whether the lock of the system could be had; None where the folder has none."""
+    def system_lock(handle: int) -> bool | None:
+        """Whether the lock of the system on an open file could be had; None where its folder has no locks."""
         os.lseek(handle, 1 << 30, os.SEEK_SET)  # beyond what is written: others read the owner
         try:
             msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
@@ -155,8 +155,8 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-    def _system_lock(handle: int) -> bool | None:
-        """Whether the lock of the system could be had; None where the folder has none."""
+    def system_lock(handle: int) -> bool | None:
+        """Whether the lock of the system on an open file could be had; None where its folder has no locks."""
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:

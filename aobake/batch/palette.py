@@ -67,15 +67,16 @@ def _cells(pixels: ByteArray) -> tuple[FloatArray, NDArray[np.int64], NDArray[np
 
     A cell is 6 bits of green, and 5 of how much redder and how much bluer it is: greys are told apart best.
     """
-    red, green, blue = pixels.astype(np.int16).T
+    bands = np.ascontiguousarray(pixels.T)
+    red, green, blue = bands.astype(np.int16)
     keys = (green >> 2 << 10) | ((red - green + 256) >> 4 << 5) | ((blue - green + 256) >> 4)
-    order = np.argsort(keys.view(np.uint16), kind="stable")  # 16 bits: a radix sort
-    starts = np.flatnonzero(np.diff(keys[order], prepend=~keys[order[0]]))
-    counts = np.diff(starts, append=len(keys))
-    sums = np.add.reduceat(pixels[order].astype(np.int64), starts, axis=0)
-    which = np.empty(len(keys), np.int64)
-    which[order] = np.repeat(np.arange(len(counts)), counts)
-    return sums / counts[:, None], counts, which
+    inside = np.bincount(keys.view(np.uint16))
+    cells = np.flatnonzero(inside)
+    number = np.empty(len(inside), np.int64)
+    number[cells] = np.arange(len(cells))
+    which, counts = number[keys.view(np.uint16)], inside[cells]
+    sums = [np.bincount(which, band) for band in bands]
+    return np.stack(sums, axis=1) / counts[:, None], counts, which
 
 
 def _chunk(kind: bytes, content: bytes) -> bytes:

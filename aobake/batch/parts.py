@@ -43,14 +43,14 @@ class Part:
     """One step of a texture bake in tiles.
 
     step : lay out the charts; trace tile `number` of `count`; or put all together
-    folder : where the parts hand on what they make, relative to the folder of all outputs
+    stem : how the names of all files begin that parts hand on, relative to the folder of all outputs
     key : what their files are signed with
     """
 
     step: Step
     number: int
     count: int
-    folder: str
+    stem: str
     key: bytes = field(repr=False)
 
     @property
@@ -61,17 +61,21 @@ class Part:
     @property
     def needs(self) -> tuple[str, ...]:
         """The files of other parts that it needs, relative to the folder of all outputs."""
-        tiles = tuple(self.tile(number) for number in range(self.count))
-        return {"layout": (), "trace": (self.layout,), "join": (self.layout, *tiles)}[self.step]
+        return {"layout": (), "trace": (self.layout,), "join": self.files}[self.step]
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """All files that parts of this bake hand on, whether they are there yet or not."""
+        return (self.layout, *(self.tile(number) for number in range(self.count)))
 
     @property
     def layout(self) -> str:
         """The file with the layout."""
-        return f"{self.folder}/layout"
+        return f"{self.stem}-layout__.part"
 
     def tile(self, number: int) -> str:
         """The file with the bands of a tile."""
-        return f"{self.folder}/tile{number}"
+        return f"{self.stem}-tile{number:04}.part"
 
 
 def first_part(output: str, count: int) -> Part:
@@ -79,15 +83,11 @@ def first_part(output: str, count: int) -> Part:
 
     output : the file to be written, relative to the folder of all outputs
     """
-    folder, _, _ = output.rpartition("/")
-    own = f".aobake-{secrets.token_hex(8)}.tiles"
-    return Part(
-        step="layout",
-        number=0,
-        count=count,
-        folder=f"{folder}/{own}" if folder else own,
-        key=secrets.token_bytes(KEY_BYTES),
-    )
+    folder, slash, _ = output.rpartition("/")
+    # Names of unfinished files: should this run be killed, the next one removes them like any other.
+    stem = f"{folder}{slash}.aobake-{secrets.token_hex(4)}"
+    key = secrets.token_bytes(KEY_BYTES)
+    return Part(step="layout", number=0, count=count, stem=stem, key=key)
 
 
 def make_part(part: Part, job: Job, target: Path) -> None:
@@ -109,9 +109,7 @@ def make_part(part: Part, job: Job, target: Path) -> None:
         # Dealt out like cards: rows of one region cost alike, so every tile gets of each.
         made = trace_bands(bake, bands_of(bake)[part.number :: part.count])
     records = [piece for item in made for piece in _record(item, part, part.makes)]
-    file = target / part.makes
-    file.parent.mkdir(exist_ok=True)
-    write_files({file: records})
+    write_files({target / part.makes: records})
 
 
 def join_bake(part: Part, target: Path) -> Bake:

@@ -24,7 +24,7 @@ from aobake.meshes.scene import Mesh, Scene
 from aobake.results import BakedTexture, BakedVertices
 from aobake.shading.camera import View, axes_from, extent, framing
 from aobake.shading.columns import dot, some, unit
-from aobake.shading.materials import Look, appearance, look_of
+from aobake.shading.materials import Appearance, Baked, Look, appearance, look_of
 from aobake.shading.seen import Seen, seen
 from aobake.shading.stage import Stage, stage_of
 from aobake.shading.tone import to_srgb
@@ -37,7 +37,7 @@ FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
 
-WIDTH_PX, HEIGHT_PX = 160, 120
+WIDTH_PX, HEIGHT_PX = 128, 96
 AZIMUTH, ELEVATION = 30.0, 20.0
 HALF_HEIGHT = math.tan(math.radians(15.0))
 AMBIENT, KEY = np.float32(0.72), np.float32(0.36)
@@ -47,24 +47,28 @@ LAYERS = 8  # of cut-out surfaces, one behind the other
 PAST = np.float32(1.0 + 1e-5)
 EDGE_PLACES = np.array([[0.25, 0.125], [0.875, 0.25], [0.125, 0.75], [0.75, 0.875]])
 SHARP_EDGE = 0.9  # cosine between the normals of neighbours
+DISPLAYED = np.rint(255.0 * to_srgb(np.linspace(0.0, 1.0, 4096, dtype=np.float32))).astype(np.uint8)
 
 
-def pictures_of(done: Done, kind: Pictures) -> Mapping[str, bytes]:
-    """What a report shows of a job that is done.
+def pictures_of(done: Done, kind: Pictures) -> tuple[Mapping[str, bytes], tuple[str, ...]]:
+    """What a page shows of a job that is done, and what to say of what could not be made.
 
     kind : "thumbnails": "before" and "after", as PNG; "viewers": "viewer" as well, an HTML page
-    Returns nothing for what cannot be shown. A texture is shown by its own texels.
+    Empty for "none", and for an asset of which nothing can be seen. A texture is shown by its own texels.
     """
-    if kind == "none":
-        return {}
-    found = {}
-    try:
-        found = dict(thumbnails(done.baked))
-        if kind == "viewers" and done.report.outputs:
+    found: dict[str, bytes] = {}
+    trouble: list[str] = []
+    if kind != "none":
+        try:
+            found |= thumbnails(done.baked)
+        except AobakeError as error:
+            trouble.append(f"no pictures were made: {error}")
+    if kind == "viewers" and done.report.outputs:
+        try:
             found["viewer"] = _viewer(Path(done.report.outputs[0].path), done)
-    except AobakeError:  # a picture is no reason for a job to fail
-        pass
-    return found
+        except AobakeError as error:
+            trouble.append(f"no viewer was made: {error}")
+    return found, tuple(trouble)
 
 
 def thumbnails(baked: BakedVertices | BakedTexture) -> Mapping[str, bytes]:
@@ -83,7 +87,9 @@ def thumbnails(baked: BakedVertices | BakedTexture) -> Mapping[str, bytes]:
         if not (np.isfinite(view.position).all() and math.isfinite(frame.scale)):
             return {}
         stage = stage_of(scene, frame)
-        before, after = _Camera(stage, view, look_of(scene, None, WIDTH_PX), baked).pair()
+        at_vertices = Baked(ao=baked.ao) if isinstance(baked, BakedVertices) else None
+        look = look_of(scene, at_vertices, WIDTH_PX)
+        before, after = _Camera(stage, view, look, baked).pair()
     return {"before": png_of(before), "after": png_of(after)}
 
 
@@ -115,8 +121,8 @@ class _Camera:
             down = (y[edges] + EDGE_PLACES[:, 1:]).reshape(-1)
             finer = self.shot(across, down).colors.reshape(2, 3, len(EDGE_PLACES), len(edges))
             colors[:, :, edges] = finer.mean(axis=2)
-        shown = np.rint(255.0 * to_srgb(np.clip(colors, 0.0, 1.0))).astype(np.uint8)
-        before, after = np.moveaxis(shown.reshape(2, 3, HEIGHT_PX, WIDTH_PX), 1, -1)
+        shown = _as_displayed(colors).reshape(2, 3, HEIGHT_PX, WIDTH_PX)
+        before, after = np.moveaxis(shown, 1, -1)
         return before, after
 
     def shot(self, x: FloatArray, y: FloatArray) -> _Pixels:
@@ -128,12 +134,12 @@ class _Camera:
             tree, towards = self.stage.tree, some(directions, active)
             hits = nearest_hits(tree, some(origins, active), towards, near)
             met = np.flatnonzero(hits.thing >= 0)
-            if len(met) == 0:
-                break
             hits, active = hits.only(met), active[met]
             points = seen(self.stage, hits, some(directions, active))
             holes = self._paint(points, active, pixels)
             active, near = active[holes], hits.distance[holes] * PAST
+            if len(active) == 0:
+                break
         return pixels
 
     def _rays(self, x: FloatArray, y: FloatArray) -> tuple[Float32Array, Float32Array]:
@@ -148,15 +154,41 @@ class _Camera:
     def _paint(self, points: Seen, rows: NDArray[np.int64], pixels: _Pixels) -> NDArray[np.int64]:
         """Paint what is solid; returns which of the points are holes, to be looked through."""
         looks = appearance(self.look, points)
-        solid = looks.alpha >= 0.5
+        solid = np.flatnonzero(looks.alpha >= 0.5)
         key = np.array(KEY_FROM) @ self.view.axes
         towards = (key / np.linalg.norm(key)).astype(np.float32)[:, None]
         direct = KEY * np.maximum(dot(points.normal, towards), 0.0)
-        occlusion = np.stack([np.ones_like(direct), _occlusion(self.baked, points)])
-        colors = (AMBIENT * occlusion + direct)[:, None, :] * looks.albedo + looks.emitted
-        pixels.colors[:, :, rows[solid]] = colors[:, :, solid]
-        pixels.normals[:, rows[solid]] = points.normal[:, solid]
-        return np.flatnonzero(~solid)
+        painted = rows[solid]
+        for colors, occlusion in zip(
+            pixels.colors, (1.0, self._occlusion(looks, points)), strict=True
+        ):
+            lit = (AMBIENT * occlusion + direct) * looks.albedo + looks.emitted
+            _put(colors, painted, some(lit, solid))
+        _put(pixels.normals, painted, some(points.normal, solid))
+        return np.flatnonzero(looks.alpha < 0.5)
+
+    def _occlusion(self, looks: Appearance, points: Seen) -> Float32Array:
+        """(N,) what was baked, at points."""
+        if isinstance(self.baked, BakedVertices):
+            return looks.ao
+        found = np.ones(len(points.face), np.float32)
+        for number in np.unique(points.instance):
+            rows = np.flatnonzero(points.instance == number)
+            face, weights = points.face[rows], some(points.weights, rows)
+            found[rows] = _in_texture(self.baked, int(number), face, weights)
+        return found
+
+
+def _put(vectors: Float32Array, chosen: NDArray[np.int64], values: Float32Array) -> None:
+    """Set the chosen ones of (3, N) vectors. vectors[:, chosen] takes several times as long."""
+    for row, new in zip(vectors, values, strict=True):
+        row[chosen] = new
+
+
+def _as_displayed(linear: Float32Array) -> NDArray[np.uint8]:
+    """Values of any shape as displays take them, out of a table: a power for each takes six times as long."""
+    within = np.fmax(np.fmin(linear, np.float32(1.0)), np.float32(0.0))  # also what is no number
+    return DISPLAYED[(within * np.float32(len(DISPLAYED) - 1)).astype(np.int64)]
 
 
 def _edges(normals: Float32Array) -> BoolArray:
@@ -171,28 +203,12 @@ def _edges(normals: Float32Array) -> BoolArray:
     return edge.reshape(-1)
 
 
-def _occlusion(baked: BakedVertices | BakedTexture, points: Seen) -> Float32Array:
-    """(N,) what was baked, at points."""
-    found = np.ones(len(points.face), np.float32)
-    for number in np.unique(points.instance):
-        rows = np.flatnonzero(points.instance == number)
-        face, weights = points.face[rows], points.weights[:, rows]
-        found[rows] = _at(baked, int(number), face, weights)
-    return found
-
-
-def _at(
-    baked: BakedVertices | BakedTexture,
-    number: int,
-    face: NDArray[np.int32],
-    weights: Float32Array,
+def _in_texture(
+    baked: BakedTexture, number: int, face: NDArray[np.int32], weights: Float32Array
 ) -> Float32Array | float:
-    """(N,) what was baked on an instance; face (N,) and weights (3, N) of points; 1 where nothing was."""
-    mesh = baked.scene.meshes[baked.scene.instances[number].mesh]
-    if isinstance(baked, BakedVertices):
-        values = baked.ao[number][mesh.faces[face]]
-        return np.asarray((weights * values.T).sum(axis=0), np.float32)
+    """(N,) the texels of an instance; face (N,) and weights (3, N) of points; 1 where it has none."""
     placing = baked.lightmap.placings[number]
+    mesh = baked.scene.meshes[baked.scene.instances[number].mesh]
     corners = None if placing is None else _coordinates(mesh, placing, face)
     if placing is None or corners is None:
         return 1.0

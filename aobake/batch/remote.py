@@ -33,7 +33,7 @@ MARKS = (
 WHOLE_AT_ONCE = {"s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "oci", "oss", "memory"}
 USUAL = ("az", "gs", "hdfs", "s3", "sftp", "smb", "webdav")  # that fsspec knows, of many more
 PIECE = 1 << 20
-LEFT = re.compile(r"\.aobake-[0-9A-Za-z_-]+\.(part|tiles)")
+LEFT = re.compile(r"\.aobake-[0-9a-z_-]+\.part")  # names of unfinished files, and no others
 CURE = "Check the address, and that this machine may use it (docs/cluster.md)."
 
 
@@ -137,19 +137,13 @@ class RemoteFolder:
         ):
             self._files.rm_file(self._full(name))
 
-    def remove_folder(self, name: str) -> None:
-        """Remove a folder and all that is in it; nothing where there is none. Raises OutputError."""
-        with (
-            self._told(name, OutputError, "removed"),
-            contextlib.suppress(FileNotFoundError),
-        ):
-            self._files.invalidate_cache()
-            self._files.rm(self._full(name), recursive=True)
-
     def remove_leftovers(self) -> tuple[str, ...]:
-        """Remove what a batch that was killed had not finished writing; the names. Raises what it takes."""
+        """Remove what a run that was killed had not finished writing; their names, sorted.
+
+        Raises InputError, and OutputError where something stays.
+        """
         names = [found.name for found in self.files(lambda _: True)]
-        left = tuple(name for name in names if any(LEFT.fullmatch(p) for p in name.split("/")))
+        left = tuple(name for name in names if LEFT.fullmatch(posixpath.basename(name)))
         for name in left:
             self.remove(name)
         return left

@@ -162,8 +162,10 @@ def _make(folder: Path) -> None:
 
 
 def _tidied(target: Place) -> tuple[str, ...]:
-    """What a killed run left in a target on this machine, which is removed."""
-    return remove_leftovers(target.path("")) if isinstance(target, LocalFolder) else ()
+    """What a killed run left in a target, which is removed."""
+    if isinstance(target, RemoteFolder):
+        return target.remove_leftovers()
+    return remove_leftovers(target.path(""))
 
 
 def _settled(batch: Batch, manifest: Manifest, pairs: Pairs, watcher: Watcher) -> Pairs:

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from aobake.batch.child import Child, Heard
+from aobake.batch.scratch import remove_abandoned
 from aobake.batch.tasks import Outcome, Status, Task
 from aobake.batch.worker import Ready
 from aobake.errors import EngineError
@@ -90,6 +91,7 @@ class Supervisor:
     def run(self) -> None:
         """Go on until it hears None. What goes wrong with itself is put among the outcomes, and ends it."""
         try:
+            remove_abandoned()
             while self._hear():
                 self._look()
                 self._hand_out()

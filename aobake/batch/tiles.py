@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import shutil
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -197,10 +196,13 @@ def _whole(cut: _Cut, last: Outcome) -> Outcome:
 def _clear(cut: _Cut) -> None:
     """Remove what parts have handed on. What cannot be removed stays: the next batch tries again."""
     remote, target = cut.task.remote, cut.task.target
-    if target is not None:
-        shutil.rmtree(target / cut.first.folder, ignore_errors=True)
-    elif remote is not None:
-        from aobake.batch.remote import RemoteFolder
+    with contextlib.suppress(AobakeError, OSError):
+        if target is None and remote is not None:
+            from aobake.batch.remote import RemoteFolder
 
-        with contextlib.suppress(AobakeError):
-            RemoteFolder(remote.target, remote.options).remove_folder(cut.first.folder)
+            there = RemoteFolder(remote.target, remote.options)
+            for name in cut.first.files:
+                there.remove(name)
+        elif target is not None:
+            for name in cut.first.files:
+                (target / name).unlink(missing_ok=True)

@@ -133,12 +133,12 @@ def _make_folder(output: Path) -> None:
         raise OutputError(f"{output}: its folder cannot be made ({why}).") from error
 
 
-def _pictures(task: Task, done: Done) -> tuple[Mapping[str, bytes], list[str]]:
+def _pictures(task: Task, done: Done) -> tuple[Mapping[str, bytes], Sequence[str]]:
     """The pictures of a task, and what to say where there are none."""
     from aobake.batch.pictures import pictures_of
 
     try:
-        return dict(pictures_of(done, task.pictures)), []
+        return pictures_of(done, task.pictures)
     except Exception as error:  # noqa: BLE001 - the asset is baked and written: nothing else matters
         return {}, [f"no pictures were made: {_bug(error)}"]
 

@@ -13,7 +13,6 @@ from urllib.parse import quote
 
 from aobake.errors import OutputError
 from aobake.files import write_files
-from aobake.viewer.page import shared_scripts
 
 __all__ = ["Beside", "keep_viewer"]
 
@@ -78,6 +77,8 @@ class Beside:
 
 @functools.cache
 def _scripts() -> dict[str, bytes]:
+    from aobake.viewer.page import shared_scripts  # which takes longer than a batch with nothing to do
+
     return shared_scripts()
 
 

@@ -103,7 +103,7 @@ function choose() {
 function pictures(row) {
   return ["before", "after"]
     .filter((which) => row[which])
-    .map((which) => make("img", { src: row[which], alt: `${which} baking`, width: 160, height: 120, decoding: "async" }));
+    .map((which) => make("img", { src: row[which], alt: `${which} baking`, width: 128, height: 96, decoding: "async" }));
 }
 
 function rowOf(row) {
