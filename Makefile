@@ -2,7 +2,8 @@
 # make test    set up, then run the tests
 # make install set up only: everything goes into ./.venv, nothing outside of it is touched
 # make check   format, lint, strict types, tests
-# make bench   the measurements that the documents quote
+# make bench   the measurements that the documents quote; BENCH="tracing --quick" chooses
+# make bench-check  the ratios that must not get worse, beside the recorded ones
 # make viewer  build the viewer of `aobake view` anew, from the versions that viewer/ pins; needs node and npm
 # make fuzz    damaged files to every reader, for FUZZ_SECONDS (60); what breaks is kept in .fuzz/failures
 #
@@ -11,6 +12,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 FUZZ_SECONDS ?= 60
+BENCH ?=
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
@@ -19,7 +21,7 @@ export PIP_REQUIRE_VIRTUALENV := 1
 unexport PIP_USER PYTHONHOME PYTHONPATH
 
 .DELETE_ON_ERROR:
-.PHONY: demo test install check lint bench viewer fuzz clean
+.PHONY: demo test install check lint bench bench-check viewer fuzz clean
 
 demo: install
 	@$(BIN)/aobake demo -o aobake-demo --force
@@ -38,7 +40,10 @@ lint: install
 	@$(BIN)/mypy
 
 bench: install
-	@for benchmark in benchmarks/*.py; do $(BIN)/python "$$benchmark" || exit 1; done
+	@$(BIN)/python benchmarks $(BENCH)
+
+bench-check: install
+	@$(BIN)/python benchmarks --check
 
 viewer:
 	@command -v npm >/dev/null || { echo "aobake: building the viewer needs node 20 or newer, with npm." >&2; exit 1; }

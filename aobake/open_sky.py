@@ -27,6 +27,7 @@ __all__ = ["EVERYTHING", "OpenSky", "expected_share", "hull_rays", "sky_over"]
 EVERYTHING = -1  # stands for all that occludes, beside the numbers of instances
 TRIED = 64  # points that are looked at one by one, to tell how many there may be
 RAYS_A_VERTEX = 200  # that could be traced while a vertex is taken into the hull
+LEAST_RAYS = 100_000  # fewer are traced long before the library that makes hulls is loaded
 AT_ONCE = 1 << 14  # vertices
 
 
@@ -86,7 +87,8 @@ def expected_share(
     chosen = forced(settings.effect).get("open_sky")
     if chosen is False or ground is not None or not len(points) or not placements:
         return 0.0
-    worth, price = count * settings.rays, 0 if chosen else hull_rays(prepared, placements)
+    worth = count * settings.rays
+    price = 0 if chosen else max(LEAST_RAYS, hull_rays(prepared, placements))
     if worth < price:
         return 0.0
     few = points.only(np.linspace(0, len(points) - 1, min(TRIED, len(points))).astype(np.int64))

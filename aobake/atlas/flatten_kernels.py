@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from aobake.atlas.topology_kernels import border_loop, glued, opened
-from aobake.tracing.compiled import inlined, kernel, tight_kernel
+from aobake.tracing.compiled import inlined, kernel, routine
 from aobake.tracing.vectors import cross, dot, length, minus, row
 
 __all__ = ["flatten_pieces"]
@@ -35,7 +35,7 @@ def _cotangent(vertices, a, b, c):
     return dot(u, v) / area if area > 0.0 else 0.0
 
 
-@kernel
+@routine
 def _laplacian(vertices, corners, across, vertex_of, count):
     """Cotangent weights in compressed rows: start (n + 1,), other, weight, and the diagonal (n,).
 
@@ -73,7 +73,7 @@ def _laplacian(vertices, corners, across, vertex_of, count):
     return start, other, weight, diagonal
 
 
-@kernel
+@routine
 def _solve(  # noqa: C901, PLR0912 - loops over rows, spelled out for the compiler
     start, other, weight, diagonal, fixed, right, x, tolerance
 ):
@@ -120,7 +120,7 @@ def _solve(  # noqa: C901, PLR0912 - loops over rows, spelled out for the compil
         size = new
 
 
-@kernel
+@routine
 def _on_circle(vertices, corners, vertex_of, across, loop, start, other, weight, count, area):
     """(n, 2) Tutte's embedding in a circle of the piece's area, the border spaced by its lengths."""
     x, fixed = np.zeros((count, 2)), np.zeros(count, np.bool_)
@@ -146,7 +146,7 @@ def _on_circle(vertices, corners, vertex_of, across, loop, start, other, weight,
     return x
 
 
-@kernel
+@routine
 def _rest_shapes(vertices, corners):
     """Per triangle: the inverse of its edges laid into the plane (m, 4), and its area (m,)."""
     count = len(corners) // 3
@@ -173,7 +173,7 @@ def _jacobian(x, vertex_of, inverse, t):
     return p * g0, p * g1 + q * g3, r * g0, r * g1 + s * g3
 
 
-@tight_kernel
+@inlined
 def _energy(x, vertex_of, inverse, area):
     """The symmetric Dirichlet energy; infinite where a triangle is flipped."""
     total = 0.0
@@ -186,7 +186,7 @@ def _energy(x, vertex_of, inverse, area):
     return total
 
 
-@tight_kernel
+@inlined
 def _slope(x, vertex_of, inverse, area, g):
     """Fill g (n, 2), the gradient of the energy."""
     for v in range(len(g)):
@@ -214,7 +214,7 @@ def _slope(x, vertex_of, inverse, area, g):
         g[i, 1] -= jv + kv
 
 
-@tight_kernel
+@inlined
 def _longest_step(x, d, vertex_of, count):
     """How far along d (n, 2) until the first triangle flips; at most 1 / BACK."""
     longest = 1.0 / BACK
@@ -255,7 +255,7 @@ def _sum(a, share, b, result):
         result[v, 1] = a[v, 1] + share * b[v, 1]
 
 
-@kernel
+@routine
 def _direct(laplacian, g, moves, turns, kept, q, d):
     """Fill d (n, 2): minus the inverse Hessian, as L-BFGS knows it, times g. Source: J. Nocedal, 1980."""
     start, other, weight, diagonal, free = laplacian
@@ -276,7 +276,7 @@ def _direct(laplacian, g, moves, turns, kept, q, d):
         _sum(d, -share, moves[n], d)
 
 
-@kernel
+@routine
 def _relax(x, vertex_of, inverse, area, laplacian):
     """Lower the energy of x (n, 2) in place until it settles."""
     g, new_g, q, d = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
@@ -316,7 +316,7 @@ def _relax(x, vertex_of, inverse, area, laplacian):
             break
 
 
-@kernel
+@routine
 def _flatten(vertices, corners, across, uv):
     """Lay one piece into the plane: fill uv (3 m, 2) and return its L2 stretch, or infinity.
 

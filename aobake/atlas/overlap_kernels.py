@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aobake.tracing.compiled import inlined, kernel
+from aobake.tracing.compiled import inlined, kernel, routine
 
 __all__ = ["note_overlaps"]
 
@@ -40,7 +40,7 @@ def _cells(uv, f, low_u, low_v, size, cells):
     )
 
 
-@kernel
+@routine
 def _overlaps(uv, chosen, tolerance):  # noqa: C901, PLR0912 - a grid is filled and looked up at once
     """Whether any two of the chosen triangles overlap by more than a share of the whole."""
     low_u = low_v = np.inf

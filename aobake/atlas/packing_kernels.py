@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aobake.tracing.compiled import kernel
+from aobake.tracing.compiled import kernel, routine
 
 __all__ = ["place_charts", "set_upright"]
 
@@ -20,7 +20,7 @@ ALIKE = (
 )
 
 
-@kernel
+@routine
 def _hull(points):
     """Corners of the convex hull of points in ascending order. Source: A. Andrew, 1979. Needs two points."""
     hull, count = np.empty((2 * len(points) + 1, 2)), 0
@@ -86,7 +86,7 @@ def set_upright(points, starts, extent):
         extent[c, 0], extent[c, 1] = high_u - low_u, high_v - low_v
 
 
-@kernel
+@routine
 def _touched(points, triangles, scale, shift_x, shift_y, mask):
     """Set the cells of mask (h, w) that triangles touch; points are scaled and shifted to cells."""
     h, w = mask.shape
@@ -118,7 +118,7 @@ def _touched(points, triangles, scale, shift_x, shift_y, mask):
                 mask[r, c] = True
 
 
-@kernel
+@routine
 def _turned(mask, turn):
     """The mask after quarter turns that take (x, y) to (-y, x)."""
     for _ in range(turn):
@@ -131,7 +131,7 @@ def _turned(mask, turn):
     return mask
 
 
-@kernel
+@routine
 def _widened(mask, by):
     """The mask (h, w) grown by some cells to all sides: (h + 2 by, w + 2 by)."""
     h, w = mask.shape
@@ -155,7 +155,7 @@ def _widened(mask, by):
     return grown
 
 
-@kernel
+@routine
 def _spans(mask):
     """(S, 3) int32 runs of set cells: row, first column, column after the last; the longest one first."""
     h, w = mask.shape
@@ -178,7 +178,7 @@ def _spans(mask):
     return spans[:count]
 
 
-@kernel
+@routine
 def _first_place(spans, occupied, free, roomiest, first, first_y, last_x, last_y):
     """The first (y, x) from row first_y on at which no span meets an occupied cell; y = -1: there is none."""
     wide = spans[0, 2] - spans[0, 1]
@@ -200,7 +200,7 @@ def _first_place(spans, occupied, free, roomiest, first, first_y, last_x, last_y
     return -1, -1
 
 
-@kernel
+@routine
 def _occupy(mask, y, x, taken, occupied, free, roomiest):
     """Enter a mask, and bring the rows' jumps up to date; how many cells it covers."""
     h, w = mask.shape

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aobake.tracing.compiled import inlined, kernel
+from aobake.tracing.compiled import inlined, kernel, routine
 
 __all__ = ["border_loop", "connected", "glued", "opened"]
 
@@ -34,7 +34,7 @@ def _join(parent, one, other):
     parent[max(a, b)] = min(a, b)
 
 
-@kernel
+@routine
 def glued(across):
     """(vertex of each corner (3 m,) int32, number of vertices)."""
     parent = np.arange(len(across)).astype(np.int32)
@@ -54,7 +54,7 @@ def glued(across):
     return vertex_of, count
 
 
-@kernel
+@routine
 def border_loop(across):
     """Half-edges of the border that the first border half-edge is on, in order; empty if there is none."""
     loop = np.empty(len(across), np.int32)
@@ -74,7 +74,7 @@ def border_loop(across):
     return loop[:length]
 
 
-@kernel
+@routine
 def opened(across, vertex_of, count):  # noqa: C901 - one cut, from its tree to its last loose end
     """Cut a connected piece (across, in place) until it is a disc; False for a closed one, left as it is.
 
@@ -113,7 +113,7 @@ def opened(across, vertex_of, count):  # noqa: C901 - one cut, from its tree to 
     return True
 
 
-@kernel
+@routine
 def _crossed(across):
     """(3 m,) bool: the half-edges that a breadth-first tree of the faces crosses."""
     crossed, seen = np.zeros(len(across), np.bool_), np.zeros(len(across) // 3, np.bool_)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.tracing.compiled import inlined, kernel
+from aobake.tracing.compiled import inlined, tight_kernel
 from aobake.tracing.vectors import cross, dot, length, minus, row
 
 __all__ = ["consistent_winding"]
@@ -31,41 +31,71 @@ def consistent_winding(
     """
     turned, inward = np.zeros(len(faces), bool), np.zeros(len(faces), bool)
     if len(faces):
-        start, other, edge = _edges_by_place(faces, place)
-        _settle(vertices, faces, place, start, other, edge, turned, inward)
+        _settle(
+            vertices,
+            faces,
+            place,
+            _edges_by_place(faces, place),
+            _parts(len(faces)),
+            turned,
+            inward,
+        )
     return turned, inward
 
 
-@kernel
-def _edges_by_place(faces, place):
+def _edges_by_place(
+    faces: NDArray[np.uint32], place: NDArray[np.int32]
+) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.uint32]]:
     """Edges grouped by the lower of their two places: (start (V + 1,), the higher place, which edge).
 
     Edges are numbered 3 face + k, and their lists are ordered by the higher place, so that equal edges
     lie side by side. Sorting all edges by one key took five times the memory, and longer.
     """
-    start = np.zeros(len(place) + 1, np.int64)
+    start = np.zeros(len(place) + 2, np.int64)
+    other, edge = np.empty(3 * len(faces), np.int32), np.empty(3 * len(faces), np.uint32)
+    _group_edges(faces, place, start, other, edge)
+    start = start[:-1]
+    count = np.diff(start)
+    many = count > FEW
+    if many.any():
+        at = np.flatnonzero(np.repeat(many, count))
+        order = at[np.lexsort((other[at], np.repeat(np.flatnonzero(many), count[many])))]
+        other[at], edge[at] = other[order], edge[order]
+    return start, other, edge
+
+
+def _parts(count: int) -> tuple[NDArray[np.generic], ...]:
+    """Memory for a union-find over faces: parent, parity, torn, is_open, volume, area."""
+    return (
+        np.arange(count, dtype=np.int32),
+        np.zeros(count, np.uint8),
+        np.zeros(count, np.bool_),
+        np.zeros(count, np.bool_),
+        np.zeros(count),
+        np.zeros(count),
+    )
+
+
+@tight_kernel
+def _group_edges(faces, place, start, other, edge):
+    """Fill what _edges_by_place returns, and sort the lists that are not long.
+
+    start : (V + 2,) zeros; while edges are put in, start[v + 1] is where the next one of v goes
+    """
     for f in range(len(faces)):
         for k in range(3):
-            start[min(place[faces[f, k]], place[faces[f, (k + 1) % 3]]) + 1] += 1
+            start[min(place[faces[f, k]], place[faces[f, (k + 1) % 3]]) + 2] += 1
     for v in range(len(place)):
-        start[v + 1] += start[v]
-    other = np.empty(3 * len(faces), np.int32)
-    edge = np.empty(3 * len(faces), np.uint32)
-    filled = start[:-1].astype(np.int64)
+        start[v + 2] += start[v + 1]
     for f in range(len(faces)):
         for k in range(3):
             a, b = place[faces[f, k]], place[faces[f, (k + 1) % 3]]
-            at = filled[min(a, b)]
+            at = start[min(a, b) + 1]
             other[at], edge[at] = max(a, b), 3 * f + k
-            filled[min(a, b)] += 1
+            start[min(a, b) + 1] += 1
     for v in range(len(place)):
         if start[v + 1] - start[v] <= FEW:
             _sort_few(other, edge, start[v], start[v + 1])
-        else:
-            order = np.argsort(other[start[v] : start[v + 1]])
-            other[start[v] : start[v + 1]] = other[start[v] : start[v + 1]][order]
-            edge[start[v] : start[v + 1]] = edge[start[v] : start[v + 1]][order]
-    return start, other, edge
 
 
 @inlined
@@ -117,13 +147,16 @@ def _begins_low(faces, place, edge):
     return place[faces[f, k]] < place[faces[f, (k + 1) % 3]]
 
 
-@kernel
-def _settle(vertices, faces, place, start, other, edge, turned, inward):
-    """Fill turned and inward (F,): a union-find over neighbours that keeps each face's parity."""
+@tight_kernel
+def _settle(vertices, faces, place, edges, parts, turned, inward):
+    """Fill turned and inward (F,): a union-find over neighbours that keeps each face's parity.
+
+    edges : of _edges_by_place
+    parts : of _parts; torn, at roots: somewhere within, neighbours disagree
+    """
+    start, other, edge = edges
+    parent, parity, torn, is_open, volume, area = parts
     count = len(faces)
-    parent, parity = np.arange(count).astype(np.int32), np.zeros(count, np.uint8)
-    torn = np.zeros(count, np.bool_)  # at roots: somewhere within, neighbours disagree
-    is_open = np.zeros(count, np.bool_)
     for v in range(len(start) - 1):
         first = start[v]
         while first < start[v + 1]:
@@ -138,7 +171,6 @@ def _settle(vertices, faces, place, start, other, edge, turned, inward):
                 for e in range(first, last):
                     is_open[edge[e] // 3] = True
             first = last
-    volume, area = np.zeros(count), np.zeros(count)
     for f in range(count):
         root, against = _find(parent, parity, f)
         o = row(vertices, faces[root, 0])

@@ -1,30 +1,48 @@
 """How kernels are compiled: with numba, once per machine, without the interpreter lock.
 
-The compiled code is kept beside the source or, where that folder is read-only, in the user's cache
-folder. Where neither can be written (a container without a home), kernels are compiled anew in each
-process instead of failing.
+The compiled code is kept in the user's cache folder (kept.py); where that cannot be written, kernels are
+compiled anew in each process. What made the first run of all short, in seconds of a vertex bake's 18:
+
+- no wrappers for Python and C around functions that only kernels call: 4;
+- arrays as arguments, where np.empty and np.zeros in a kernel bring numba's formatting of strings with
+  them for the errors that they could raise, and np.argsort its quicksort: 7.
+
+Tried and left: merging small functions before they are typed (numba's inline="always") took four times as
+long for place_origins, since each copy is typed and lowered again.
 """
 
 from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core.ccallback import CFunc
+from numba.extending import register_jitable
 from numpy.typing import NDArray
+
+from aobake.tracing.kept import Kept
 
 __all__ = [
     "aligned",
     "callback",
     "import_without_blas",
     "inlined",
+    "is_kept",
     "kernel",
     "read_only",
+    "routine",
     "tight_kernel",
 ]
+
+# numpy's error model drops the zero-division checks, which would keep loops from being vectorised.
+CALLED_BACK: Mapping[str, object] = {"error_model": "numpy"}
+COUNTED = {"error_model": "numpy", "nogil": True, "_nrt": True, "no_cfunc_wrapper": True}
+UNCOUNTED = COUNTED | {"_nrt": False}
+INLINED, ROUTINE = UNCOUNTED | {"no_cpython_wrapper": True}, COUNTED | {"no_cpython_wrapper": True}
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -33,7 +51,7 @@ ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function over arrays and numbers when it is first called; keep the code on disk."""
-    return _kept_on_disk(function, counted=True)
+    return _compiled(function, COUNTED)
 
 
 def tight_kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -42,25 +60,47 @@ def tight_kernel(function: Callable[P, R]) -> Callable[P, R]:
     Every view of an array is a counted reference else, and threads that share the array fight over
     the counter: it made the placing of origins six times slower. Scratch memory is an argument.
     """
-    return _kept_on_disk(function, counted=False)
+    return _compiled(function, UNCOUNTED)
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """A function that kernels call; LLVM merges it into them. Allocates nothing."""
-    return _compiled(function, kept=False, counted=False)
+    """A function that kernels call; LLVM merges it into them. Allocates nothing. From Python it is Python."""
+    _UNKNOWN.append((function, INLINED))
+    return function
 
 
-def _kept_on_disk(function: Callable[P, R], *, counted: bool) -> Callable[P, R]:
-    try:
-        return _compiled(function, kept=True, counted=counted)
-    except RuntimeError:  # "no locator available": nowhere to keep it
-        return _compiled(function, kept=False, counted=counted)
+def routine(function: Callable[P, R]) -> Callable[P, R]:
+    """A function that kernels call and that allocates. From Python it is Python."""
+    _UNKNOWN.append((function, ROUTINE))
+    return function
 
 
-def _compiled(function: Callable[P, R], *, kept: bool, counted: bool) -> Callable[P, R]:
-    # numpy's error model drops the zero-division checks, which would keep loops from being vectorised.
-    compiler: Any = numba.njit(nogil=True, error_model="numpy", cache=kept, _nrt=counted)  # type: ignore[call-overload]
-    return cast("Callable[P, R]", compiler(function))
+# Functions that numba has not been told of. That takes 0.6 ms for each, and only compiling needs it.
+_UNKNOWN: list[tuple[Callable[..., object], Mapping[str, object]]] = []
+
+
+def _introduce() -> None:
+    """Tell numba of all functions that kernels may call."""
+    while _UNKNOWN:
+        function, options = _UNKNOWN.pop()
+        register_jitable(**options)(function)
+
+
+def _compiled(function: Callable[P, R], options: Mapping[str, object]) -> Callable[P, R]:
+    compiler: Any = numba.njit(**options)  # type: ignore[call-overload]
+    compiled = compiler(function)
+    compiled._cache = _kept(function, options)  # noqa: SLF001 - numba has no public way
+    return cast("Callable[P, R]", compiled)
+
+
+def _kept(function: Callable[..., object], options: Mapping[str, object]) -> Kept:
+    return Kept(function, f"{options} {INLINED} {ROUTINE}", before_compiling=_introduce)
+
+
+def is_kept(kernel: Callable[P, R]) -> bool:
+    """Whether the code of a kernel, as it is now, is on disk for arguments of some types."""
+    compiled: Any = kernel
+    return bool(compiled._cache.known())  # noqa: SLF001 - as above
 
 
 def aligned(count: int, dtype: type[np.generic]) -> NDArray[np.generic]:
@@ -93,19 +133,17 @@ def read_only(array: NDArray[ScalarT]) -> NDArray[ScalarT]:
     return view
 
 
-def callback(signature: object, function: Callable[..., object]) -> int:
-    """The address of a C function made from a Python one. The code lives as long as the process."""
-    try:
-        compiled = _c_function(signature, function, kept=True)
-    except RuntimeError:
-        compiled = _c_function(signature, function, kept=False)
+def callback(signature: Any, function: Callable[..., object]) -> int:
+    """The address of a C function made from a Python one. The code lives as long as the process.
+
+    signature : numba's, of the result called with the arguments
+    """
+    types = signature.args, signature.return_type
+    compiled: Any = CFunc(function, types, {}, dict(CALLED_BACK))
+    compiled._cache = _kept(function, CALLED_BACK)  # noqa: SLF001 - as above
+    compiled.compile()
     _ALIVE.append(compiled)
     return int(compiled.address)
-
-
-def _c_function(signature: object, function: Callable[..., object], *, kept: bool) -> Any:
-    compiler: Any = numba.cfunc(signature, cache=kept, error_model="numpy")
-    return compiler(function)
 
 
 _ALIVE: list[object] = []  # a cfunc that is collected takes its machine code with it

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import re
+from pathlib import Path
 
 import pytest
 
@@ -16,8 +18,9 @@ from aobake.settings import (
     TraceSettings,
     VertexSettings,
 )
+from aobake.tracing import kept
 from tests.conftest import Run
-from tests.support import modules_after, python
+from tests.support import modules_after, one_line, python
 
 HEAVY = {"numpy", "numba", "trimesh", "scipy", "DracoPy", "embreex", "llvmlite"}
 
@@ -32,6 +35,21 @@ def test_what_needs_no_bake_imports_nothing_heavy(arguments: list[str]) -> None:
     loaded = modules_after(code)
     assert "cyclopts" in loaded
     assert not loaded & HEAVY
+
+
+def test_a_command_is_imported_alone(run: Run) -> None:
+    code = "import sys, aobake.cli; aobake.cli.main(['info', '--help']); print(*sys.modules)"
+    done = python("-c", code)
+    assert done.returncode == 0, done.stderr
+    loaded = done.stdout.splitlines()[-1].split()
+    assert "aobake.cli.info" in loaded
+    assert not {f"aobake.cli.{name}" for name in COMMANDS if name != "info"} & set(loaded)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_a_command_is_listed_as_is_how_its_own_help_begins(name: str) -> None:
+    command = getattr(importlib.import_module(f"aobake.cli.{name}"), name)
+    assert command.__doc__.splitlines()[0] == COMMANDS[name]
 
 
 def test_every_command_is_in_the_help_with_what_it_does(run: Run) -> None:
@@ -77,3 +95,12 @@ def test_help_fits_into_80_columns() -> None:
 
 def test_the_version_is_that_of_the_package(run: Run) -> None:
     assert run("--version").out == f"{aobake.__version__}\n"
+
+
+def test_a_cache_that_cannot_be_written_is_one_line_and_no_failure(
+    run: Run, corner: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept, "_PROBLEMS", ["compiled code cannot be kept in here.", "nor there."])
+    ran = run("vertex", corner, "-o", tmp_path / "out.obj", "--rays", 4)
+    assert ran.status == 0
+    assert one_line(ran.err, "warning: compiled code cannot be kept in here.")

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from aobake.meshes.formats.gltf.meshopt_kernels import CUT, HEADER, REFERENCE, TAIL
+from aobake.tracing.compiled import kernel, routine
 
 __all__ = ["indices", "triangles"]
 
@@ -27,7 +27,7 @@ WRAP = 0xFFFFFFFF
 AT, NEXT, LAST, EDGES, VERTICES = 0, 1, 2, 3, 4
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _varint(data: ByteArray, at: Whole, end: Whole) -> tuple[Whole, Whole]:
     """An unsigned number of up to five bytes and where reading goes on, or -1."""
     value = np.int64(0)
@@ -42,7 +42,7 @@ def _varint(data: ByteArray, at: Whole, end: Whole) -> tuple[Whole, Whole]:
     return np.int64(0), np.int64(-1)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def indices(data: ByteArray, count: Whole, out: WordArray) -> Whole:
     """Decode `count` indices of any kind into out, (count,)."""
     if len(data) < 1 or data[0] != 0xD1:
@@ -62,7 +62,7 @@ def indices(data: ByteArray, count: Whole, out: WordArray) -> Whole:
     return 0 if at == end else TAIL
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _new(state: State) -> Whole:
     """The next new vertex."""
     vertex = state[NEXT]
@@ -70,7 +70,7 @@ def _new(state: State) -> Whole:
     return np.int64(vertex)
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _explicit(data: ByteArray, end: Whole, state: State) -> Whole:
     """A vertex given by its distance from the last such one, or -1."""
     value, at = _varint(data, state[AT], end)
@@ -81,20 +81,20 @@ def _explicit(data: ByteArray, end: Whole, state: State) -> Whole:
     return np.int64(state[LAST])
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _keep_vertex(vertices: State, state: State, vertex: Whole) -> None:
     vertices[state[VERTICES] & 15] = vertex
     state[VERTICES] += 1
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _keep_edge(edges: State, state: State, a: Whole, b: Whole) -> None:
     edges[state[EDGES] & 15, 0] = a
     edges[state[EDGES] & 15, 1] = b
     state[EDGES] += 1
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _on_edge(
     data: ByteArray,
     end: Whole,
@@ -128,7 +128,7 @@ def _on_edge(
     return 0
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _on_its_own(
     data: ByteArray, end: Whole, ways: State, state: State, vertices: State, abc: State
 ) -> Whole:
@@ -150,7 +150,7 @@ def _on_its_own(
     return 0
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _ways(data: ByteArray, end: Whole, low: Whole, state: State, ways: State) -> Whole:
     """How the corners of a triangle on its own are given; the status."""
     ways[0] = 15 if low == 15 else 0
@@ -169,7 +169,7 @@ def _ways(data: ByteArray, end: Whole, low: Whole, state: State, ways: State) ->
     return 0
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def triangles(data: ByteArray, count: Whole, out: WordArray) -> Whole:
     """Decode `count` / 3 triangles into out, (count,)."""
     if len(data) < 1 or data[0] != 0xE1:

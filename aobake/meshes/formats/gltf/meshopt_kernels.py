@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from aobake.tracing.compiled import kernel, routine
 
 __all__ = ["CUT", "HEADER", "REFERENCE", "TAIL", "attributes"]
 
@@ -25,7 +26,7 @@ GROUP = 16
 ZERO, LITERAL = 2, 3  # control modes of version 1 that hold no groups
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _group(data: ByteArray, at: Whole, bits: Whole, out: ByteArray, start: Whole) -> Whole:
     """Sixteen deltas of `bits` bits each, sentinels followed by whole bytes; where reading goes on, or -1."""
     if bits == 0:
@@ -54,7 +55,7 @@ def _group(data: ByteArray, at: Whole, bits: Whole, out: ByteArray, start: Whole
     return extra
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _bytes(data: ByteArray, at: Whole, count: Whole, mode: Whole, out: ByteArray) -> Whole:
     """The deltas of one byte of all elements of a block; where reading goes on, or -1.
 
@@ -79,7 +80,7 @@ def _bytes(data: ByteArray, at: Whole, count: Whole, mode: Whole, out: ByteArray
     return at
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _byte_deltas(
     deltas: ByteArray, count: Whole, last: ByteArray, out: ByteArray, first: Whole, stride: Whole
 ) -> None:
@@ -93,7 +94,7 @@ def _byte_deltas(
         last[j] = value
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _short_deltas(
     deltas: ByteArray, count: Whole, last: ByteArray, out: ByteArray, first: Whole, stride: Whole
 ) -> None:
@@ -109,7 +110,7 @@ def _short_deltas(
         last[j + 1] = value >> 8
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _word_deltas(
     deltas: ByteArray,
     count: Whole,
@@ -134,7 +135,7 @@ def _word_deltas(
         last[j] = (value >> (8 * j)) & 0xFF
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _four_bytes(
     data: ByteArray, at: Whole, end: Whole, block: Whole, control: Whole, deltas: ByteArray
 ) -> Whole:
@@ -160,7 +161,7 @@ def _four_bytes(
     return at
 
 
-@numba.njit(cache=True, nogil=True)
+@routine
 def _block(
     data: ByteArray,
     at: Whole,
@@ -197,7 +198,7 @@ def _block(
     return at
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def attributes(data: ByteArray, count: Whole, stride: Whole, out: ByteArray) -> Whole:
     """Decode `count` elements of `stride` bytes into out, (count * stride,); versions 0 and 1."""
     if len(data) < 1 or (data[0] != 0xA0 and data[0] != 0xA1):
