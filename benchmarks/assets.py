@@ -11,17 +11,18 @@ from __future__ import annotations
 import argparse
 import json
 import resource
-import statistics
 import struct
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scan import scan
+from tables import Spread, Table
 
 BYTES_A_FACE = 28  # half a vertex of 32 bytes, and three indices of 4 bytes
 MEGABYTE = 1_000_000
@@ -95,15 +96,39 @@ def once(source: Path, target: Path, store: str) -> None:
     print(json.dumps({**took, "memory": peak_bytes() - before, "written": target.stat().st_size}))
 
 
-def measured(source: Path, target: Path, store: str, repeats: int) -> dict[str, float]:
-    """The medians of several runs."""
+def measured(source: Path, target: Path, store: str, repeats: int) -> dict[str, Spread]:
+    """The spread of several runs."""
     command = [sys.executable, __file__, "--once", str(source), str(target), store]
     # Linux counts the peak of the process that started another one as the other one's: this one stays small.
     runs = []
     for _ in range(repeats):
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         runs.append(json.loads(done.stdout))
-    return {name: statistics.median(run[name] for run in runs) for name in runs[0]}
+    return {name: Spread.of(run[name] for run in runs) for name in runs[0]}
+
+
+def large_glb(megabytes: float, repeats: int) -> Table:
+    """Reading and writing with every store."""
+    rows = []
+    with tempfile.TemporaryDirectory() as scratch:
+        source = Path(scratch) / "large.glb"
+        making = [sys.executable, __file__, "--make", str(source)]
+        subprocess.run([*making, "--megabytes", str(megabytes)], check=True)
+        size = source.stat().st_size
+        for store in STORES:
+            took = measured(source, Path(scratch) / f"{store}.glb", store, repeats)
+            rates = [size / took[way].median / MEGABYTE for way in ("read", "write")]
+            share = took["memory"].median / size
+            written = took["written"].median / MEGABYTE
+            rows.append([store, took["read"], took["write"], *rates, share, written])
+    columns = ("--store", "read, s", "write, s", "read, MB/s", "write, MB/s",
+               "peak memory, of the file's size", "written, MB")  # fmt: skip
+    return Table("A large GLB", columns, rows, {"MB": size / MEGABYTE})
+
+
+def run(quick: bool) -> Iterator[Table]:
+    """One file of 10 or 100 MB."""
+    yield large_glb(*((10, 1) if quick else (100, 3)))
 
 
 def main() -> None:
@@ -115,25 +140,10 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.once:
         once(Path(arguments.once[0]), Path(arguments.once[1]), arguments.once[2])
-        return
-    if arguments.make:
+    elif arguments.make:
         make(arguments.make, arguments.megabytes)
-        return
-    with tempfile.TemporaryDirectory() as scratch:
-        source = Path(scratch) / "large.glb"
-        making = [sys.executable, __file__, "--make", str(source)]
-        subprocess.run([*making, "--megabytes", str(arguments.megabytes)], check=True)
-        size = source.stat().st_size
-        print(f"GLB of {size / MEGABYTE:.0f} MB, {arguments.repeats} runs each, medians.\n")
-        print(
-            "| --store | read, s | write, s | both, s | peak memory, of the file's size | written, MB |"
-        )
-        print("| --- | --- | --- | --- | --- | --- |")
-        for store in STORES:
-            took = measured(source, Path(scratch) / f"{store}.glb", store, arguments.repeats)
-            both = took["read"] + took["write"]
-            cells = f"{took['read']:.2f} | {took['write']:.2f} | {both:.2f} | {took['memory'] / size:.2f}"
-            print(f"| {store} | {cells} | {took['written'] / MEGABYTE:.0f} |")
+    else:
+        print(large_glb(arguments.megabytes, arguments.repeats).markdown())
 
 
 if __name__ == "__main__":

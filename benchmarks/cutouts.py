@@ -13,9 +13,11 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from tables import Table
 
 import aobake
 from aobake.images import encode
@@ -124,63 +126,57 @@ def points_of(cards: int, count: int = 8_000) -> tuple[FloatArray, FloatArray]:
     return positions, np.concatenate([np.tile((0.0, 0.0, 1.0), (count // 2, 1)), facing])
 
 
-def main() -> None:
-    """Print rates and agreement as Markdown tables."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--cards", type=int, default=2000)
-    parser.add_argument("--rays", type=int, default=256)
-    parser.add_argument("--repeats", type=int, default=3)
-    given = parser.parse_args()
-    mesh = cards_mesh(given.cards, 0)
+def thicket(cards: int, rays: int, repeats: int) -> Table:
+    """Rates and agreement of every way to hold the same leaves."""
+    mesh = cards_mesh(cards, 0)
     scenes = {
         "opaque": scene_of(mesh, "OPAQUE"),
         "no hole": scene_of(mesh, "MASK", holes=False),
         "MASK, bilinear": scene_of(mesh, "MASK"),
         "MASK, nearest": scene_of(mesh, "MASK", nearest=True),
         "BLEND": scene_of(mesh, "BLEND"),
-        "geometry": Scene.from_meshes([leaves_mesh(given.cards)]),
+        "geometry": Scene.from_meshes([leaves_mesh(cards)]),
     }
-    positions, normals = points_of(given.cards)
-    settings = aobake.BakeSettings(rays=given.rays)
+    positions, normals = points_of(cards)
+    settings = aobake.BakeSettings(rays=rays)
     seconds: dict[str, list[float]] = {name: [] for name in scenes}
     values = {}
-    for turn in range(given.repeats + 1):
+    for turn in range(repeats + 1):
         for name, scene in scenes.items():
             start = time.process_time()
             values[name] = aobake.visibility(scene, positions, normals, settings).mean
             if turn:  # the first one compiles and decodes
                 seconds[name].append(time.process_time() - start)
-    rays = len(positions) * given.rays
+    total, truth = len(positions) * rays, values["geometry"]
     base = statistics.median(seconds["opaque"])
-    truth = values["geometry"]
     rows = []
     for name in scenes:
-        took = statistics.median(seconds[name])
-        off = np.abs(values[name] - truth)
-        rows.append(
-            (
-                name,
-                f"{rays / took / 1e6:.1f}",
-                f"{base / took:.2f}",
-                f"{values[name].mean():.4f}",
-                f"{values[name].mean() - truth.mean():+.4f}",
-                f"{np.sqrt((off**2).mean()):.4f}",
-                f"{off.max():.4f}",
-            )
-        )
-    print(f"{given.cards} cards, {len(positions)} points x {given.rays} rays\n")
-    head = (
-        "scene",
-        "Mrays/s a thread",
-        "rate / opaque",
-        "mean AO",
-        "off geometry",
-        "rms off geometry",
-    )
-    for cells in (head, ("---",) * len(head), *rows):
-        print("| " + " | ".join(cells) + " |")
-    for name in ("no hole", "MASK, bilinear", "BLEND"):
-        print(f"\n{name}: {alpha_of(scenes[name])[0].reason}")
+        took, off = statistics.median(seconds[name]), np.abs(values[name] - truth)
+        shift = float(values[name].mean() - truth.mean())
+        mean, rms = float(values[name].mean()), float(np.sqrt((off**2).mean()))
+        rows.append([name, total / took / 1e6, base / took, mean, shift, rms, float(off.max())])
+    columns = ("scene", "Mrays/s a thread", "rate / opaque", "mean AO", "off geometry",
+               "rms off geometry", "most off geometry")  # fmt: skip
+    reasons = [
+        f"{name}: {alpha_of(scenes[name])[0].reason}"
+        for name in ("no hole", "MASK, bilinear", "BLEND")
+    ]
+    facts = {"cards": cards, "points": len(positions), "rays": rays}
+    return Table("Leaf cards", columns, rows, facts, "\n\n".join(reasons))
+
+
+def run(quick: bool) -> Iterator[Table]:
+    """A thicket."""
+    yield thicket(*((300, 32, 1) if quick else (2000, 256, 3)))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--cards", type=int, default=2000)
+    parser.add_argument("--rays", type=int, default=256)
+    parser.add_argument("--repeats", type=int, default=3)
+    given = parser.parse_args()
+    print(thicket(given.cards, given.rays, given.repeats).markdown())
 
 
 if __name__ == "__main__":

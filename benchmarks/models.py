@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import argparse
 import statistics
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from tables import Table, in_turn
 
 from aobake.shading import (
     MODELS,
@@ -76,14 +76,15 @@ def albedos(chosen: Model, values: dict[str, float]) -> list[float]:
     return found
 
 
-def energy() -> None:
-    """Print the share of the light that comes back, by angle."""
-    print("| model | " + " | ".join(f"{angle}°" for angle in ANGLES) + " |")
-    print("| --- " * (len(ANGLES) + 1) + "|")
-    for name, values in SHOWN:
-        said = ", ".join(f"{key} {value:g}" for key, value in values.items())
-        row = " | ".join(f"{albedo:.3f}" for albedo in albedos(model(name), values))
-        print(f"| {name}{', ' + said if said else ''} | {row} |")
+def energy() -> Table:
+    """The share of the light that comes back, by angle."""
+    rows = [[_said(name, values), *albedos(model(name), values)] for name, values in SHOWN]
+    return Table("Energy", ("model", *(f"{angle}°" for angle in ANGLES)), rows)
+
+
+def _said(name: str, values: Mapping[str, object]) -> str:
+    """A model and its values in words."""
+    return ", ".join([name, *(f"{key} {value}" for key, value in values.items())])
 
 
 def called(
@@ -94,47 +95,43 @@ def called(
     return lambda: chosen.function(*directions, **given)
 
 
-def speed(repeats: int) -> None:
-    """Print what a value takes, in nanoseconds and beside Lambert's."""
+def speed(repeats: int) -> Table:
+    """What a value takes, in nanoseconds and beside Lambert's."""
     rng = np.random.default_rng(0)
     n, light, view = (rng.standard_normal((BLOCK, 3)) for _ in range(3))
     n, light, view = (d / np.linalg.norm(d, axis=1)[:, None] for d in (n, light + n, view + n))
     single = [d.astype(np.float32) for d in (n, light, view)]
     metal = ("cook-torrance", {"ior": 0.2, "extinction": 3.9})
     cheap = ("cook-torrance", {"fresnel_form": "schlick"})
-    rows = [(name, {}) for name in MODELS] + [metal, cheap]
-    calls = [called(MODELS[name], values, single) for name, values in rows]
-    median = [statistics.median(seconds) / BLOCK * 1e9 for seconds in timed(calls, repeats)]
-    print("\n| model | ns per value | times Lambert |")
-    print("| --- | --- | --- |")
-    for (name, values), ns in zip(rows, median, strict=True):
-        said = ", ".join(f"{key} {value}" for key, value in values.items())
-        print(f"| {name}{', ' + said if said else ''} | {ns:.0f} | {ns / median[0]:.1f} |")
+    shown = [(name, {}) for name in MODELS] + [metal, cheap]
+    works = {_said(name, values): called(MODELS[name], values, single) for name, values in shown}
+    ns = {
+        name: statistics.median(seconds) / BLOCK * 1e9
+        for name, seconds in in_turn(works, repeats).items()
+    }
+    first = next(iter(ns.values()))
+    rows = [[name, value, value / first] for name, value in ns.items()]
+    return Table("Speed", ("model", "ns per value", "times Lambert"), rows)
 
 
-def fresnel(repeats: int) -> None:
-    """Print what Schlick's form takes beside the exact one."""
+def fresnel(repeats: int) -> Table:
+    """What the forms of Fresnel's term take beside the exact dielectric."""
     cosine = np.linspace(0.0, 1.0, BLOCK, dtype=np.float32)
-    calls: tuple[Callable[[], object], ...] = (
-        lambda: fresnel_dielectric(cosine, 1.5),
-        lambda: fresnel_schlick(cosine, 0.04),
-        lambda: fresnel_conductor(cosine, 0.2, 3.9),
-    )
-    exact, schlick, metal = (statistics.median(column) for column in timed(calls, repeats))
-    print(
-        f"\nFresnel alone, beside the exact dielectric: Schlick {schlick / exact:.2f}, metal {metal / exact:.1f}."
-    )
+    works: dict[str, Callable[[], object]] = {
+        "exact dielectric": lambda: fresnel_dielectric(cosine, 1.5),
+        "Schlick": lambda: fresnel_schlick(cosine, 0.04),
+        "metal": lambda: fresnel_conductor(cosine, 0.2, 3.9),
+    }
+    taken = {name: statistics.median(s) for name, s in in_turn(works, repeats).items()}
+    rows = [[name, s / taken["exact dielectric"]] for name, s in taken.items()]
+    return Table("Fresnel alone", ("form", "times exact"), rows)
 
 
-def timed(calls: Sequence[Callable[[], object]], repeats: int) -> list[list[float]]:
-    """Seconds of each call, made in turn."""
-    taken: list[list[float]] = [[] for _ in calls]
-    for _ in range(repeats):
-        for call, seconds in zip(calls, taken, strict=True):
-            start = time.perf_counter()
-            call()
-            seconds.append(time.perf_counter() - start)
-    return taken
+def run(quick: bool) -> Iterator[Table]:
+    """Energy and speed."""
+    yield energy()
+    yield speed(3 if quick else 15)
+    yield fresnel(3 if quick else 15)
 
 
 def main() -> None:
@@ -142,9 +139,8 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=15)
     parser.add_argument("--pictures", type=Path)
     arguments = parser.parse_args()
-    energy()
-    speed(arguments.repeats)
-    fresnel(arguments.repeats)
+    for table in (energy(), speed(arguments.repeats), fresnel(arguments.repeats)):
+        print(table.markdown())
     if arguments.pictures:
         import misprints
         import spheres

@@ -14,10 +14,11 @@ import argparse
 import dataclasses
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from scan import scan
+from tables import Spread, Table
 
 import aobake
 from aobake.render_settings import RenderSettings
@@ -64,39 +65,44 @@ def parts(scene: aobake.Scene, settings: RenderSettings, baked: Baked) -> tuple[
     return clock.spent_s, shading.spent_s - clock.spent_s
 
 
-def median_s(work: Callable[[], object], repeats: int) -> float:
-    """Median seconds by the clock."""
-    taken = []
+def tables(faces: int, size: str, samples: int, repeats: int) -> Iterator[Table]:
+    """The whole picture, then its parts for each model."""
+    scene = aobake.Scene.from_arrays(*scan(faces))
+    baked = Baked(ao=aobake.bake_vertices(scene, aobake.BakeSettings(rays=64)).ao)
+    settings = RenderSettings(size=size, samples=samples)
+    render(scene, settings, baked)  # compiles
+    whole = []
     for _ in range(repeats):
         start = time.perf_counter()
-        work()
-        taken.append(time.perf_counter() - start)
-    return statistics.median(taken)
+        render(scene, settings, baked)
+        whole.append(time.perf_counter() - start)
+    facts = {"triangles": scene.triangles, "size": size, "samples": samples}
+    rows = [["all threads, by the clock", Spread.of(whole)]]
+    yield Table("A picture with one shadowed light", ("what", "seconds"), rows, facts)
+    rows = []
+    for name in MODELS:
+        each = dataclasses.replace(settings, model=name)
+        measured = [parts(scene, each, baked) for _ in range(repeats)]
+        rays_s = statistics.median(rays for rays, _ in measured)
+        shading_s = statistics.median(shading for _, shading in measured)
+        rows.append([name, rays_s, shading_s, shading_s / rays_s])
+    yield Table("One thread", ("model", "rays, s", "shading, s", "shading / rays"), rows, facts)
+
+
+def run(quick: bool) -> Iterator[Table]:
+    """One picture."""
+    yield from tables(*((4_000, "160x90", 1, 1) if quick else (70_000, "1280x720", 4, 3)))
 
 
 def main() -> None:
-    """Measure, and print two Markdown tables."""
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     arguments.add_argument("--faces", type=int, default=70_000)
     arguments.add_argument("--size", default="1280x720")
     arguments.add_argument("--samples", type=int, default=4)
     arguments.add_argument("--repeats", type=int, default=3)
     chosen = arguments.parse_args()
-    scene = aobake.Scene.from_arrays(*scan(chosen.faces))
-    baked = Baked(ao=aobake.bake_vertices(scene, aobake.BakeSettings(rays=64)).ao)
-    settings = RenderSettings(size=chosen.size, samples=chosen.samples)
-    render(scene, settings, baked)  # compiles
-    seconds = median_s(lambda: render(scene, settings, baked), chosen.repeats)
-    print(f"{scene.triangles:,} faces, {chosen.size}, {chosen.samples} samples, one shadowed light")
-    print(f"whole picture, all threads: {seconds:.2f} s by the clock\n")
-    print("| model | rays, s | shading, s | shading / rays |")
-    print("| --- | --- | --- | --- |")
-    for name in MODELS:
-        each = dataclasses.replace(settings, model=name)
-        measured = [parts(scene, each, baked) for _ in range(chosen.repeats)]
-        rays_s = statistics.median(rays for rays, _ in measured)
-        shading_s = statistics.median(shading for _, shading in measured)
-        print(f"| {name} | {rays_s:.2f} | {shading_s:.2f} | {shading_s / rays_s:.2f} |")
+    for table in tables(chosen.faces, chosen.size, chosen.samples, chosen.repeats):
+        print(table.markdown(), flush=True)
 
 
 if __name__ == "__main__":

@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import argparse
 import math
-import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from unittest import mock
 
 import numpy as np
@@ -23,6 +22,7 @@ from embreex.rtcore_scene import EmbreeScene
 from hard import Case, ball, cases, turned
 from numpy.typing import NDArray
 from scan import scan
+from tables import Cell, Spread, Table
 
 import aobake
 from aobake import bake
@@ -112,26 +112,25 @@ def terminator(level: int, rays: int) -> tuple[float, float]:
     return float(np.abs(plain - 1.0).max()), float(np.abs(found.mean - 1.0).max())
 
 
-def print_cases(rays: int) -> None:
-    """The table of cases."""
-    print(f"{rays} rays\n")
-    print("| case | truth | naive | aobake | allowed | what is allowed for |")
-    print("| --- | --- | --- | --- | --- | --- |")
+def table_of_cases(rays: int) -> Table:
+    """The largest error of both, case by case."""
+    rows: list[list[Cell]] = []
     for case in cases():
         worst, ours, lost, flagged = errors(case, rays)
         truth = f"{case.truth.min():.3f}"
         if case.truth.max() > case.truth.min():
             truth += f" to {case.truth.max():.3f}"
-        naive_text = "no value" if math.isnan(worst) else f"{worst:.4f}"
-        naive_text += f", {lost} of {len(case.points)} NaN" if lost else ""
+        plain = "no value" if math.isnan(worst) else f"{worst:.4f}"
+        plain += f", {lost} of {len(case.points)} NaN" if lost else ""
         note = "" if ours <= case.tolerance else " **above**"
         note += f", {flagged} flagged" if flagged else ""
-        found = f"{naive_text} | {ours:.4f}{note}"
-        print(f"| {case.name} | {truth} | {found} | {case.tolerance:g} | {case.why} |")
+        rows.append([case.name, truth, plain, f"{ours:.4f}{note}", case.tolerance, case.why])
     for level in (0, 1, 2):
-        plain, ours = terminator(level, rays)
+        worst, ours = terminator(level, rays)
         name = f"inside faces of a smooth ball of {8 * 4**level}"
-        print(f"| {name} | 1.000 | {plain:.4f} | {ours:.4f} | 0.002 | nothing to estimate |")
+        rows.append([name, "1.000", f"{worst:.4f}", f"{ours:.4f}", 0.002, "nothing to estimate"])
+    columns = ("case", "truth", "naive", "aobake", "allowed", "what is allowed for")
+    return Table("Hard cases", columns, rows, {"rays": rays})
 
 
 @tight_kernel
@@ -150,7 +149,7 @@ def unguarded(*arguments: object) -> None:
     states[:] = 0
 
 
-def print_cost(faces: int, repeats: int) -> None:
+def table_of_cost(faces: int, repeats: int) -> Table:
     """What the guards cost in tracing, and in preparing and building."""
     scene = aobake.Scene.from_arrays(*scan(faces))
     settings = aobake.BakeSettings(rays=256, threads=1)
@@ -180,21 +179,28 @@ def print_cost(faces: int, repeats: int) -> None:
     }
     for way in ways.values():
         way()
-    rows = [{name: way() for name, way in ways.items()} for _ in range(repeats)]
+    runs = [{name: way() for name, way in ways.items()} for _ in range(repeats)]
     first = next(iter(ways))
-    count = f"{len(surfaces[0].faces)} faces, {len(points)} points of it, 256 rays, one thread"
-    print(f"\n{count}; processor seconds, {repeats} runs in turn, median (least to most)\n")
-    print("| what | seconds | against the first: within each run | least against least |")
-    print("| --- | --- | --- | --- |")
-    least = min(row[first] for row in rows)
+    least = min(row[first] for row in runs)
+    rows: list[list[Cell]] = []
     for name in ways:
-        seconds = [row[name] for row in rows]
-        ratio = [row[name] / row[first] for row in rows]
-        print(f"| {name} | {_spread(seconds)} | {_spread(ratio)} | {min(seconds) / least:.3f} |")
+        seconds = [run[name] for run in runs]
+        within = Spread.of(run[name] / run[first] for run in runs)
+        rows.append([name, Spread.of(seconds), within, min(seconds) / least])
+    columns = (
+        "what",
+        "processor seconds",
+        "against the first: within each run",
+        "least against least",
+    )
+    facts = {"triangles": len(surfaces[0].faces), "points": len(points), "rays": 256, "threads": 1}
+    return Table("What the guards cost", columns, rows, facts)
 
 
-def _spread(values: list[float]) -> str:
-    return f"{statistics.median(values):.3f} ({min(values):.3f} to {max(values):.3f})"
+def run(quick: bool) -> Iterator[Table]:
+    """The cases, and the cost."""
+    yield table_of_cases(256 if quick else 4096)
+    yield table_of_cost(*((4_000, 5) if quick else (70_000, 100)))
 
 
 def main() -> None:
@@ -206,9 +212,9 @@ def main() -> None:
     parser.add_argument("--no-cases", action="store_true")
     asked = parser.parse_args()
     if not asked.no_cases:
-        print_cases(asked.rays)
+        print(table_of_cases(asked.rays).markdown(), flush=True)
     if not asked.no_cost:
-        print_cost(asked.faces, asked.repeats)
+        print(table_of_cost(asked.faces, asked.repeats).markdown())
 
 
 if __name__ == "__main__":

@@ -9,9 +9,11 @@ of many rays without denoising, over covered texels.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 
 import numpy as np
 from scan import scan
+from tables import Cell, Table
 
 from aobake import BakedTexture, BakeSettings, Instance, Mesh, Scene, bake_texture
 from aobake.meshes.lightmap import Unwrapped
@@ -42,38 +44,41 @@ def spent(baked: BakedTexture) -> tuple[float, float]:
     return whole, sum(s for stage, s in stages.items() if stage not in TRACED) / whole
 
 
+def table_of(faces: int, size: int, reference: int, budgets: tuple[int, ...]) -> Table:
+    """One row for each budget, without and with the denoiser."""
+    scene, unwrap_s = unwrapped(faces, size)
+    truth = bake_texture(scene, BakeSettings(size=size, rays=reference, denoise="off", seed=1))
+    covered, rows = truth.coverage, []
+    for rays in budgets:
+        for denoise in ("off", "on"):
+            baked = bake_texture(scene, BakeSettings(size=size, rays=rays, denoise=denoise))
+            error = np.abs(baked.image - truth.image)[covered].astype(np.float64)
+            seconds, other = spent(baked)
+            row: list[Cell] = [rays, denoise, float(np.sqrt(np.mean(error**2)))]
+            row += [float(np.quantile(error, 0.99)), seconds, baked.seconds["trace"]]
+            rows.append([*row, baked.seconds.get("denoise", 0.0), f"{other:.0%}"])
+    columns = ("rays", "denoised", "RMSE", "p99", "seconds", "trace", "denoise", "all else")
+    facts = {
+        "triangles": scene.triangles,
+        "size": size,
+        "covered": f"{covered.mean():.0%}",
+        "unwrapped in": unwrap_s,
+    }
+    return Table("A lightmap", columns, rows, facts, truth.layout[0])
+
+
+def run(quick: bool) -> Iterator[Table]:
+    """One body."""
+    yield table_of(*((2_000, 128, 256, (8, 32)) if quick else (6_000, 1024, 2048, BUDGETS)))
+
+
 def main() -> None:
-    """Print one row for each budget, without and with the denoiser."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--faces", type=int, default=6000)
     parser.add_argument("--size", type=int, default=1024)
     parser.add_argument("--reference", type=int, default=2048)
     asked = parser.parse_args()
-    scene, unwrap_s = unwrapped(asked.faces, asked.size)
-    truth = bake_texture(
-        scene, BakeSettings(size=asked.size, rays=asked.reference, denoise="off", seed=1)
-    )
-    covered = truth.coverage
-    print(
-        f"{scene.triangles} faces on {asked.size} x {asked.size}, {covered.mean():.0%} covered; "
-        f"unwrapped in {unwrap_s:.1f} s; {truth.layout[0]}\n"
-    )
-    print("| rays | denoised | RMSE | p99 | seconds | trace | denoise | all else |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
-    for rays in BUDGETS:
-        for denoise in ("off", "on"):
-            baked = bake_texture(
-                scene,
-                BakeSettings(size=asked.size, rays=rays, denoise=denoise),
-            )
-            error = np.abs(baked.image - truth.image)[covered].astype(np.float64)
-            seconds, other = spent(baked)
-            print(
-                f"| {rays} | {denoise} | {np.sqrt(np.mean(error**2)):.4f} | "
-                f"{np.quantile(error, 0.99):.4f} | {seconds:.1f} | {baked.seconds['trace']:.1f} | "
-                f"{baked.seconds.get('denoise', 0.0):.1f} | {other:.0%} |",
-                flush=True,
-            )
+    print(table_of(asked.faces, asked.size, asked.reference, BUDGETS).markdown())
 
 
 if __name__ == "__main__":

@@ -12,12 +12,14 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import xatlas
 from numpy.typing import NDArray
 from scan import scan
+from tables import Cell, Table
 
 import aobake
 from aobake.atlas.packing import pack
@@ -122,6 +124,34 @@ def filled(found: Unwrapped) -> float:
     return float(0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum())
 
 
+def table_of(body: str, faces: int, size: int, padding: int) -> Table:
+    """Both on one body."""
+    vertices, triangles = BODIES[body](faces)
+    ours(*scan(2000), 256, 2)  # compiled now
+    theirs = plain(vertices, triangles, size, padding)
+    size = round(math.sqrt(theirs.width * theirs.height))
+    mine = ours(vertices, triangles, size, padding)
+    rows: list[list[Cell]] = [
+        ["image", f"{theirs.width} x {theirs.height}", f"{size} x {size}", None],
+        ["charts", theirs.charts, mine.charts, None],
+    ]
+    measures = {
+        "seconds": (theirs.seconds, mine.seconds),
+        "image filled": (filled(theirs), filled(mine)),
+        "seam length": (seams(theirs), seams(mine)),
+        "L2 stretch": (stretch(theirs), stretch(mine)),
+    }
+    rows += [[name, one, other, other / one] for name, (one, other) in measures.items()]
+    facts = {"triangles": len(triangles), "texels of padding": padding}
+    return Table(f"Unwrapping a {body}", ("what", "xatlas", "aobake", "ratio"), rows, facts)
+
+
+def run(quick: bool) -> Iterator[Table]:
+    """Both bodies."""
+    for body in BODIES:
+        yield table_of(body, *((2_000, 256, 2) if quick else (70_000, 1024, 2)))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--body", choices=BODIES, default="scan")
@@ -129,23 +159,7 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=1024)
     parser.add_argument("--padding", type=int, default=2)
     asked = parser.parse_args()
-    vertices, faces = BODIES[asked.body](asked.faces)
-    ours(*scan(2000), 256, 2)  # compiled now
-    theirs = plain(vertices, faces, asked.size, asked.padding)
-    size = round(math.sqrt(theirs.width * theirs.height))
-    mine = ours(vertices, faces, size, asked.padding)
-    print(f"{asked.body}, {len(faces)} faces, {asked.padding} texels of padding\n")
-    print("| what | xatlas | aobake | ratio |\n| --- | --- | --- | --- |")
-    print(f"| image | {theirs.width} x {theirs.height} | {size} x {size} | |")
-    print(f"| charts | {theirs.charts} | {mine.charts} | |")
-    rows = {
-        "seconds": (theirs.seconds, mine.seconds),
-        "image filled": (filled(theirs), filled(mine)),
-        "seam length": (seams(theirs), seams(mine)),
-        "L2 stretch": (stretch(theirs), stretch(mine)),
-    }
-    for name, (one, other) in rows.items():
-        print(f"| {name} | {one:.3f} | {other:.3f} | {other / one:.3f} |")
+    print(table_of(asked.body, asked.faces, asked.size, asked.padding).markdown())
 
 
 if __name__ == "__main__":
