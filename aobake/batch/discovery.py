@@ -83,7 +83,8 @@ def _planned(
         job = Job(command=command, input=path, output=target.path(name), chosen=chosen)
         reason = " ".join(refused.splitlines())  # a file may have a line break in its name
         size = file.stamp.size
-        return Planned(source=file.name, target=name, job=job, size=size, refused=reason)
+        shown = "" if reason else name
+        return Planned(source=file.name, target=shown, job=job, size=size, refused=reason)
 
     command = choices.settings.bake[0]
     if file.problem:

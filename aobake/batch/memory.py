@@ -80,7 +80,7 @@ def put_job(
     text = recipe(planned.job)
     connection.execute("INSERT OR IGNORE INTO recipes VALUES (?, ?)", (fingerprint(text), text))
     values = {
-        "target": name_stored(planned.target),
+        "target": name_stored(planned.target or _key_without(planned)),
         "source": name_stored(planned.source),
         "command": planned.job.command,
         "run": run,
@@ -95,6 +95,11 @@ def put_job(
     }
     ((number,),) = connection.execute(_PUT_JOB, values).fetchall()
     return cast(int, number)
+
+
+def _key_without(planned: Planned) -> str:
+    """What a job without a target is known by: names of outputs are relative, and none begins like this."""
+    return f"/{planned.job.command}/{planned.source}"
 
 
 def put_bake(connection: sqlite3.Connection, job: int, bake: Bake) -> None:
@@ -201,7 +206,7 @@ def entry_of(database: Database, row: Sequence[object]) -> Entry:
     read = [file for file in files if file.role == "in"]
     return Entry(
         source=name_of(source),
-        target=name_of(target),
+        target="" if name_of(target).startswith("/") else name_of(target),
         command=str(command),
         state=state,  # type: ignore[arg-type]
         reason=name_of(reason),

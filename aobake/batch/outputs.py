@@ -64,7 +64,7 @@ def without_clashes(planned: Iterable[Planned]) -> Iterator[Planned]:
             users[claim].append(one)
     for one in jobs:
         rival = next((other for c in _claims(one) for other in users[c] if other is not one), None)
-        yield one if rival is None else replace(one, refused=_clash(one, rival))
+        yield one if rival is None else replace(one, target="", refused=_clash(one, rival))
 
 
 def _claims(planned: Planned) -> list[tuple[str, str]]:
@@ -83,5 +83,5 @@ def _clash(one: Planned, rival: Planned) -> str:
     what = one.target if one.target == rival.target else f"images beside {one.target}"
     return (
         f"{one.job.input}: {what} would also be written for {rival.source}. "
-        "Exclude one of them, or give one another format in aobake.toml."
+        "Leave one of them out (--skip), or give one another format in aobake.toml."
     )

@@ -29,6 +29,9 @@ class Watcher(Protocol):
     def ended(self, outcome: Outcome, *, again: bool = False) -> None:
         """A task ended; again : it will be tried once more."""
 
+    def stopping(self, running: int, grace: float) -> None:
+        """The batch was asked to stop: so many tasks still run, and have so many seconds to end."""
+
     def tick(self) -> None:
         """Time passes: called several times a second."""
 
@@ -47,6 +50,9 @@ class Silent:
         """Nothing."""
 
     def ended(self, outcome: Outcome, *, again: bool = False) -> None:
+        """Nothing."""
+
+    def stopping(self, running: int, grace: float) -> None:
         """Nothing."""
 
     def tick(self) -> None:

@@ -43,10 +43,10 @@ def stale_files(known: Mapping[str, Known], planned: Sequence[Planned], source: 
     """What is stale now.
 
     A job is, when it is not planned and its asset is gone, or is planned with another target; an asset that
-    is there and was only not asked for keeps its outputs. A file is, when no other job needs it.
+    is there and was only not asked for, or is refused, keeps its outputs. A file is, when no other job needs it.
     """
-    targets = {job.target for job in planned}
-    assets = {job.source for job in planned}
+    targets = {job.target for job in planned if not job.refused}
+    assets = {job.source for job in planned if not job.refused}
     jobs = frozenset(
         job.target
         for job in known.values()

@@ -35,6 +35,7 @@ from aobake.jobs import Reading
 __all__ = ["STATE", "Batch", "Ended", "Pairs", "Reports", "compare", "run_batch"]
 
 POLL_S = 0.25  # how often the watcher hears that time passes
+NOT_BEGUN = "the batch was stopped before it was begun"
 AGAIN = {"crashed", "memory", "timeout"}  # what a second attempt may cure
 
 Pairs = list[tuple[Planned, Standing]]
@@ -124,9 +125,11 @@ def run_batch(
             run = manifest.begin({"source": batch.source.name, "target": batch.target.name})
             pairs = list(zip(planned, manifest.standings(planned), strict=True))
             to_bake = _settled(batch, manifest, pairs, watcher)
-            if to_bake:
+            if to_bake and not stop.is_set():
                 with executor() as workers:
                     _Run(batch, manifest, workers, watcher, stop).bake(to_bake)
+            elif to_bake:
+                manifest.note([job for job, _ in to_bake], "stopped", NOT_BEGUN)
             interrupted = stop.is_set()
             pruned = manifest.prune(planned) if batch.prune and not interrupted else None
             manifest.finish({"interrupted": interrupted})
@@ -227,11 +230,15 @@ class _Run:
             self._record(ended)
             self._watcher.tick()
         if self._stop.is_set():
-            self._record(self._without_retries(self._executor.stop(self._batch.settings.grace)))
+            grace = self._batch.settings.grace
+            self._watcher.stopping(self._schedule.running, grace)
+            self._record(self._without_retries(self._executor.stop(grace)))
             rest = [job for number, job in enumerate(self._jobs) if number not in self._settled]
-            self._manifest.note(rest, "stopped", "the batch was stopped before it was begun")
+            self._manifest.note(rest, "stopped", NOT_BEGUN)
 
     def _start_some(self) -> None:
+        if self._stop.is_set():
+            return
         for number, threads in self._schedule.next(self._executor.capacity, time.monotonic()):
             self._attempts[number] = self._attempts.get(number, 0) + 1
             task = self._task(number, threads)

@@ -34,7 +34,7 @@ class BatchSettings:
     """
 
     bake: tuple[Command, ...] = ("vertex",)
-    """What to bake: vertex, texture, or both; with both, names of outputs end in _vertex and _texture."""
+    """What to bake. Both, once for each: outputs then end in _vertex and _texture."""
 
     format: str | None = None
     """Ending of the outputs, such as glb. None: that of the asset where it can hold the result, else glb."""

@@ -44,7 +44,8 @@ class Planned:
     source, target : the asset and its output, relative to their two folders, with forward slashes
     job : the same with the paths to use; where the folders are remote, its paths are relative
     size : of the asset, in bytes
-    refused : why it cannot be done, in one line; '' where it can. It is reported as failed and never run
+    refused : why it cannot be done, in one line; '' where it can. It is reported as failed, never run, and
+        has no target: ''
     """
 
     source: str

@@ -42,8 +42,7 @@ class RunOptions:
     """Say what would be baked, why, and with which settings; bake nothing."""
 
     list_commands: bool = False
-    """Print one command line for each asset that is to be baked, for another farm manager, and make the
-    folders that they write into; bake nothing."""
+    """Print a command for each asset to bake, for other farm managers, and make their folders; bake nothing."""
 
     cluster: str | None = None
     """Bake on the dask cluster with this scheduler, such as tcp://scheduler:8786."""
@@ -81,10 +80,11 @@ def batch(
     wanted = batch_of(folder, output, batch, bake, options, command="batch")
     if run.dry_run and run.list_commands:
         raise SettingsError("--dry-run and --list-commands both bake nothing; give one of them.")
-    if run.dry_run or run.list_commands:
-        pairs = compare(wanted)
-        terminal.say(*(_commands(pairs) if run.list_commands else _dry(pairs)))
+    if run.dry_run:
+        terminal.say_names(*_dry(compare(wanted)))
         return 0
+    if run.list_commands:
+        return _list_commands(wanted, compare(wanted))
     stop = threading.Event()
 
     def executor() -> AbstractContextManager[Executor]:
@@ -117,11 +117,28 @@ def _dry(pairs: Pairs) -> Iterator[str]:
     yield _counts(pairs)
 
 
-def _commands(pairs: Pairs) -> Iterator[str]:
+def _list_commands(batch: Batch, pairs: Pairs) -> int:
+    """Print what is to be baked as commands, and say what none can bake; the exit status."""
+    from aobake.batch.places import LocalFolder
+
+    for place in (batch.source, batch.target):
+        if not isinstance(place, LocalFolder):
+            raise SettingsError(
+                f"--list-commands is for folders on this machine, not {place.name}."
+            )
+    status = 0
     for planned, standing in pairs:
-        if standing.to_bake:
+        line = shlex.join(command_line(planned.job))
+        if standing.kind == "refused":
+            terminal.error(planned.refused)
+            status = 1
+        elif standing.to_bake and not line.isprintable():
+            terminal.error(f"{planned.job.input}: its name cannot stand in a line. Rename it.")
+            status = 1
+        elif standing.to_bake:
             make_folder(planned.job.output.parent)
-            yield shlex.join(command_line(planned.job))
+            terminal.say(line)
+    return status
 
 
 def _counts(pairs: Pairs) -> str:

@@ -89,6 +89,14 @@ class _Watching:
         elif outcome.status not in {"done", "stopped"}:
             terminal.error(outcome.reason)
 
+    def stopping(self, running: int, grace: float) -> None:
+        told = self.draw is not None or self.between_s is not None
+        if told and running and grace:
+            assets, them = (
+                ("1 asset has", "it") if running == 1 else (f"{running:,} assets have", "them")
+            )
+            terminal.note(f"stopping; {assets} {grace:g} s to end. Ctrl-C again ends {them} now.")
+
     def tick(self) -> None:
         now = self.clock()
         if self.draw is not None:
@@ -97,8 +105,9 @@ class _Watching:
             self._say(now)
 
     def close(self) -> None:
-        """Say where it ended, where lines are said."""
-        if self.between_s is not None and self.state.settled > self.state.skipped:
+        """Say where it ended, where lines are said and it came to an end."""
+        ran = self.state.settled > self.state.skipped and self.state.settled == self.state.total
+        if self.between_s is not None and ran and not self.state.stopped:
             self._say(self.clock())
 
     def _say(self, now: float) -> None:

@@ -51,8 +51,7 @@ class FolderOptions:
     """Folder that side files of assets may lie in. Left out: the folder of each asset."""
 
     state: Path | None = None
-    """Folder for what is remembered of earlier runs. Left out: .aobake in the output folder; needed where
-    that is a URL."""
+    """Folder for what is remembered of earlier runs; needed for a URL. Left out: .aobake in the output folder."""
 
     force: bool = False
     """Bake everything anew, also what has not changed."""
@@ -83,8 +82,13 @@ def batch_of(
         )
     state = options.state or Path(output) / STATE
     data = options.report or (state if remote else Path(output)) / "report.json"
+    page = data.with_suffix(".html")
+    if len({data, page, options.junit}) < 3:
+        raise SettingsError(
+            f"--report {data}: {page} is for people to read. Give names that differ."
+        )
     for file in (options.report, options.junit):
-        if file is not None:
+        if file is not None and file.parent != Path(output):  # which is made, where there is none
             check_writable(file)
     return Batch(
         source=place_of(folder),
@@ -93,7 +97,7 @@ def batch_of(
         flags=bake or {},
         reading=Reading(root=options.root),
         state=state,
-        reports=Reports(data=data, page=data.with_suffix(".html"), junit=options.junit),
+        reports=Reports(data=data, page=page, junit=options.junit),
         force=options.force,
         prune=options.prune,
         command=f"aobake {command} {folder} -o {output}",
@@ -101,9 +105,15 @@ def batch_of(
 
 
 def _settings(given: Mapping[str, object]) -> BatchSettings:
+    from aobake.batch.outputs import check_format
+
     checked: dict[str, Any] = dict(given)  # by __post_init__
     try:
-        return BatchSettings(**checked)
+        settings = BatchSettings(**checked)
+        for command in settings.bake:
+            if settings.format is not None:
+                check_format(command, settings.format)
+        return settings
     except SettingsError as error:
         raise SettingsError(in_flags(str(error), BatchSettings)) from error
 
@@ -143,11 +153,11 @@ def tell(ended: Ended, batch: Batch, *, quiet: bool) -> int:
     """Say how a batch ended, in a few lines; the exit status."""
     totals = ended.totals
     if not quiet:
-        terminal.say(f"{batch.target.name}: {_counted(totals)}. {batch.reports.page} shows them.")
+        page = batch.reports.page
+        terminal.say_names(f"{batch.target.name}: {_counted(totals)}. {page} shows them.")
         if ended.leftovers:
             terminal.say(f"{len(ended.leftovers)} unfinished files of a killed run were removed.")
-        for line in _stale(ended):
-            terminal.say(line)
+        terminal.say_names(*_stale(ended))
     if ended.interrupted:
         terminal.error("interrupted; the same command goes on from here.")
         return 130

@@ -17,6 +17,7 @@ __all__ = [
     "progress_bar",
     "reset",
     "say",
+    "say_names",
     "tables",
     "warn",
 ]
@@ -31,7 +32,8 @@ Section = tuple[str, Mapping[str, str]]
 """A title, and what is said under it: name -> value."""
 
 MOST_WARNINGS = 10
-_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+# Controls, and marks that turn the direction of what follows.
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 
 
 def error(message: str) -> None:
@@ -56,6 +58,11 @@ def note(message: str) -> None:
 def say(*lines: str) -> None:
     """Lines on stdout."""
     sys.stdout.write("".join(f"{line}\n" for line in lines))
+
+
+def say_names(*lines: str) -> None:
+    """Lines on stdout with names of files in them, each on one line whatever the names hold."""
+    say(*map(_one_line, lines))
 
 
 @contextlib.contextmanager

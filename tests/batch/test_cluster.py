@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -205,5 +206,6 @@ def test_an_address_without_a_scheduler_is_refused_in_one_line(address: str, nee
     with pytest.raises(SettingsError) as refused:
         ClusterExecutor(address, patience=0.5)
     assert str(refused.value).startswith(f"{address}: ")
+    assert logging.getLogger("distributed").level != logging.CRITICAL, "as it was before"
     assert needed in str(refused.value)
     assert "\n" not in str(refused.value)

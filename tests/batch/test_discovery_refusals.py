@@ -41,7 +41,7 @@ def test_assets_with_one_output_are_refused_and_name_each_other(
         assert reasons[one].startswith(f"{tmp_path / 'in' / one}: ")
         assert what in reasons[one]
         assert f"for {other}." in reasons[one]
-        assert "Exclude one of them" in reasons[one]
+        assert "Leave one of them out" in reasons[one]
 
 
 def test_assets_of_one_name_that_share_no_file_are_baked(tmp_path: Path) -> None:

@@ -121,7 +121,9 @@ def test_odd_assets_give_two_pictures_or_none(
         findings=(),
         warnings=(),
     )
-    assert set(pictures_of(done(baked), "thumbnails")) in (set(), {"before", "after"})
+    found, trouble = pictures_of(done(baked), "thumbnails")
+    assert set(found) in (set(), {"before", "after"})
+    assert not trouble
 
 
 def test_holes_of_a_cut_out_are_looked_through(tmp_path: Path) -> None:
@@ -136,20 +138,33 @@ def test_holes_of_a_cut_out_are_looked_through(tmp_path: Path) -> None:
     assert np.ptp(shown(pictures["before"])) == 0.0
 
 
+def test_light_that_is_no_number_spoils_no_picture(corner: Path) -> None:
+    scene = aobake.load(corner)
+    glowing = aobake.Material(emissive=(np.nan, np.inf, -1.0))
+    meshes = tuple(dataclasses.replace(mesh, material=0) for mesh in scene.meshes)
+    odd = dataclasses.replace(scene, meshes=meshes, materials=(glowing,))
+    assert set(thumbnails(aobake.bake_vertices(odd, FEW))) == {"before", "after"}
+
+
 def test_nothing_is_drawn_where_nothing_is_asked_for(corner: Path) -> None:
-    assert pictures_of(done(aobake.bake_vertices(aobake.load(corner), FEW)), "none") == {}
+    assert pictures_of(done(aobake.bake_vertices(aobake.load(corner), FEW)), "none") == ({}, ())
 
 
 def test_a_viewer_shows_the_output_and_shares_its_script(corner: Path, tmp_path: Path) -> None:
     baked = aobake.bake_vertices(aobake.load(corner), FEW)
     output = tmp_path / "corner.glb"
     aobake.save(baked, output)
-    found = pictures_of(done(baked, output), "viewers")
+    found, trouble = pictures_of(done(baked, output), "viewers")
+    assert not trouble
     assert set(found) == {"before", "after", "viewer"}
     assert b'<script src="viewer.min.js">' in found["viewer"]
     assert len(found["viewer"]) < 40_000 + 2 * output.stat().st_size
     output.unlink()
-    assert set(pictures_of(done_without(baked, output), "viewers")) == {"before", "after"}
+    found, trouble = pictures_of(done_without(baked, output), "viewers")
+    assert set(found) == {"before", "after"}
+    assert len(trouble) == 1
+    assert trouble[0].startswith("no viewer was made: ")
+    assert "corner.glb" in trouble[0]
 
 
 def done_without(baked: BakedVertices, output: Path) -> Done:

@@ -131,6 +131,16 @@ def test_without_a_terminal_failures_are_told_at_once_and_the_rest_now_and_then(
     assert "aobake: 4 of 4 assets" in capfd.readouterr().err
 
 
+def test_a_stop_is_told_of_with_what_still_runs(capfd: pytest.CaptureFixture[str]) -> None:
+    with watching(quiet=False, clock=Clock()) as watcher:
+        watcher.planned(3, 0, 3.0)
+        watcher.started(task(0), 1.0)
+        watcher.stopping(1, 10.0)
+        watcher.ended(outcome(0, "stopped"))
+    said = "aobake: stopping; 1 asset has 10 s to end. Ctrl-C again ends it now.\n"
+    assert capfd.readouterr().err == said
+
+
 def test_quiet_tells_failures_alone(capfd: pytest.CaptureFixture[str]) -> None:
     clock = Clock()
     with watching(quiet=True, clock=clock) as watcher:

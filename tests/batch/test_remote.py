@@ -88,7 +88,7 @@ def test_files_are_copied_and_removed_and_a_second_removal_is_none(store: str) -
 
 
 def test_what_a_killed_batch_left_is_removed_and_nothing_else(store: str) -> None:
-    left = ["a/.aobake-0a1B_-2.part", ".aobake-77ff.tiles/tile0"]
+    left = ["a/.aobake-0a1b_-2.part", ".aobake-77ff77ff-tile0001.part"]
     kept = ["a/part", ".aobake/batch.json", "my.aobake-1.part.glb"]
     folder = put(store, **dict.fromkeys([*left, *kept], b"x"))
     assert sorted(folder.remove_leftovers()) == sorted(left)

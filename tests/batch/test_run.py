@@ -194,6 +194,29 @@ def test_what_crashes_is_tried_again_as_often_as_asked(batch: Batch) -> None:
     assert (found["a.obj"], found["props/b.obj"]) == ("baked", "memory")
 
 
+def test_each_of_two_assets_with_one_output_is_told_of_and_the_output_before_stays(
+    batch: Batch, tmp_path: Path
+) -> None:
+    source, output = tmp_path / "in", tmp_path / "out" / "a.obj"
+    ran(batch)
+    before = output.read_bytes()
+    rival = source / "a.stl"
+    rival.write_text("solid\nendsolid\n", encoding="ascii")
+    both = replace(batch.settings, format="obj")
+    ended = ran(replace(batch, settings=both, prune=True))
+    found = states(batch)
+    assert (found["a.obj"], found["a.stl"], found["props/b.obj"]) == (
+        "failed",
+        "failed",
+        "unchanged",
+    )
+    assert (ended.totals.jobs, ended.totals.failures) == (5, 3)
+    assert output.read_bytes() == before
+    rival.unlink()
+    ran(batch)
+    assert states(batch)["a.obj"] == "unchanged"
+
+
 def test_a_stop_begins_nothing_new_and_the_next_run_goes_on(batch: Batch, tmp_path: Path) -> None:
     stop = threading.Event()
     first = InThisProcess(after=lambda _: stop.set())
@@ -207,6 +230,15 @@ def test_a_stop_begins_nothing_new_and_the_next_run_goes_on(batch: Batch, tmp_pa
     assert sorted(second.begun) == sorted(
         {"a.obj", "b.obj", "c.obj", "broken.glb"} - set(first.begun) | done
     )
+
+
+def test_nothing_begins_once_it_is_to_stop(batch: Batch) -> None:
+    stop = threading.Event()
+    stop.set()
+    executor = InThisProcess()
+    assert ran(batch, executor, stop=stop).interrupted
+    assert executor.begun == []
+    assert set(states(batch).values()) == {"stopped"}
 
 
 def test_a_second_batch_into_the_same_folder_is_refused(batch: Batch) -> None:

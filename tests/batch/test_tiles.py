@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from aobake import InputError
+from aobake.batch.leftovers import remove_leftovers
 from aobake.batch.parts import first_part, join_bake, make_part
 from aobake.batch.tasks import Capacity, Outcome, Remote, Status, Task
 from aobake.batch.tiles import TiledExecutor
@@ -86,8 +87,8 @@ def test_any_number_of_tiles_gives_the_bytes_of_the_whole(tmp_path: Path, count:
         assert parted.report.rays == whole.report.rays
         assert parted.report.findings == whole.report.findings
         assert parted.report.warnings == whole.report.warnings
-        for file in (tmp_path / "out" / part.folder).iterdir():
-            file.unlink()
+        for name in part.files:
+            (tmp_path / "out" / name).unlink()
     else:
         executor.start(task)
         (outcome,) = executor.finished(60.0)
@@ -177,7 +178,7 @@ def test_what_parts_hand_on_is_removed_however_it_ends(tmp_path: Path) -> None:
     executor = TiledExecutor(inner, "on")
     executor.start(texture(tmp_path))
     assert executor.finished(0.0) == []
-    assert any("tiles" in name for name in tree(tmp_path / "out")), "the layout is there"
+    assert any("-layout" in name for name in tree(tmp_path / "out"))
     executor.close()
     assert inner.closed
     assert tree(tmp_path / "out") == {}
@@ -215,14 +216,29 @@ def test_a_part_that_somebody_else_put_there_is_never_opened(tmp_path: Path) -> 
     assert repr(part.key) not in repr(task) + repr(part)
 
 
-def test_the_folder_of_the_parts_is_one_that_is_cleaned_up_and_never_baked(tmp_path: Path) -> None:
-    from aobake.batch.remote import LEFT
+def test_what_parts_hand_on_is_removed_by_the_next_run_where_this_one_is_killed(
+    tmp_path: Path,
+) -> None:
+    part = first_part("sub/deep/chair.glb", 4)
+    assert len(part.files) == 5
+    for name in part.files:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(b"")
+    assert remove_leftovers(tmp_path) == tuple(sorted(part.files))
 
-    folder = first_part("sub/deep/chair.glb", 4).folder
-    assert folder.startswith("sub/deep/.aobake-")
-    assert LEFT.fullmatch(folder.rpartition("/")[2])
-    far = texture(tmp_path)
-    far = replace(far, target=None, remote=Remote(source="memory://a", target="memory://b"))
+
+def test_a_task_with_remote_folders_is_cut_as_well(tmp_path: Path) -> None:
+    task = texture(tmp_path)
     inner = Recorder()
-    TiledExecutor(inner, "on").start(replace(far, job=replace(far.job, output=Path("chair.glb"))))
+    TiledExecutor(inner, "on").start(
+        replace(
+            task,
+            job=replace(task.job, output=Path("sub/chair.glb")),
+            target=None,
+            remote=Remote(source="memory://a", target="memory://b"),
+        )
+    )
     assert steps(inner) == ["layout"]
+    part = inner.tasks[0].part
+    assert part is not None
+    assert part.makes.startswith("sub/.aobake-")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aobake.batch.page.beside import keep_viewer
+from aobake.batch.page.beside import files_beside, keep_viewer
 from aobake.batch.page.page import write_page
 
-__all__ = ["keep_viewer", "write_page"]
+__all__ = ["files_beside", "keep_viewer", "write_page"]

@@ -14,9 +14,14 @@ from urllib.parse import quote
 from aobake.errors import OutputError
 from aobake.files import write_files
 
-__all__ = ["Beside", "keep_viewer"]
+__all__ = ["Beside", "files_beside", "keep_viewer"]
 
 _OWN = re.compile(r"[0-9a-f]{32}\.(html|png)")
+
+
+def files_beside(page: Path) -> Path:
+    """The folder of a page."""
+    return page.with_name(f"{page.stem}_files")
 
 
 def keep_viewer(page: Path, target: str, viewer: bytes) -> None:
@@ -39,7 +44,7 @@ class Beside:
 
     def __init__(self, page: Path) -> None:
         """page : the HTML file, whether or not it is there yet"""
-        self.folder = page.with_name(f"{page.stem}_files")
+        self.folder = files_beside(page)
         self._used: set[str] = set()
 
     def make(self) -> None:
@@ -77,7 +82,9 @@ class Beside:
 
 @functools.cache
 def _scripts() -> dict[str, bytes]:
-    from aobake.viewer.page import shared_scripts  # which takes longer than a batch with nothing to do
+    from aobake.viewer.page import (
+        shared_scripts,
+    )  # which takes longer than a batch with nothing to do
 
     return shared_scripts()
 

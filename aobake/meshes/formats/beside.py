@@ -7,6 +7,7 @@ from pathlib import Path
 
 from aobake.errors import InputError, OutputError
 from aobake.files import read_bytes, same_file
+from aobake.meshes.formats.references import references
 
 __all__ = ["copies_beside", "make_folders"]
 
@@ -16,10 +17,12 @@ def copies_beside(asset: Path, files: Iterable[Path], target: Path) -> dict[Path
 
     asset : the file that was read     files : what belongs to it     target : what is written for it
     Each keeps its place relative to the asset; one that lies above the asset's folder would leave the
-    target's, and is not copied. Empty where the folder stays the same.
+    target's, and is not copied. One that is there already is replaced where the asset that stands at the
+    target refers to it: it is the copy of an earlier bake. Empty where the folder stays the same.
     Raises OutputError where another file of that name, with other content, is there already.
     """
     copies: dict[Path, bytes] = {}
+    earlier: frozenset[str] | None = None
     folder = asset.parent.absolute()
     for file in files:
         relative = _below(file.absolute(), folder)
@@ -32,10 +35,12 @@ def copies_beside(asset: Path, files: Iterable[Path], target: Path) -> dict[Path
         if copy.exists():
             if _content(copy, target) == content:
                 continue
-            raise OutputError(
-                f"{copy}: another file of this name is there, and {target.name} needs the one of {asset}. "
-                "Move it, or write into another folder."
-            )
+            earlier = frozenset(references(target)) if earlier is None else earlier
+            if relative.as_posix() not in earlier:
+                raise OutputError(
+                    f"{copy}: another file of this name is there, and {target.name} needs the one of "
+                    f"{asset}. Move it, or write into another folder."
+                )
         copies[copy] = content
     return copies
 

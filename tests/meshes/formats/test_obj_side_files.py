@@ -124,3 +124,25 @@ def test_a_library_that_is_no_file_is_passed_over(tmp_path: Path, library: str) 
     text = f"mtllib {library}\n{TRIANGLE}".encode("utf-8", "surrogatepass")
     path.write_bytes(text.replace(b"\0", b"\x01"))
     assert names(load(path), path.parent) == ["asset.obj"]
+
+
+def test_a_copy_of_an_earlier_bake_is_replaced_when_its_original_changed(tmp_path: Path) -> None:
+    path, target = asset(tmp_path, "a.mtl"), tmp_path / "out" / "asset.obj"
+    write(load(path), target)
+    (path.parent / "a.mtl").write_text("newmtl a\nmap_Kd wood grain.png\nmap_Ks sub/gloss.png\n")
+    (path.parent / "sub" / "gloss.png").write_text("H")
+    written = write(load(path), target)
+    assert [file.name for file in written] == ["asset.obj", "a.mtl", "gloss.png"]
+    for name in ("a.mtl", "sub/gloss.png"):
+        assert (target.parent / name).read_bytes() == (path.parent / name).read_bytes()
+
+
+def test_what_the_earlier_bake_does_not_name_is_not_its_copy(tmp_path: Path) -> None:
+    path, target = asset(tmp_path, "a.mtl"), tmp_path / "out" / "asset.obj"
+    write(load(path), target)
+    (target.parent / "stone.png").write_text("of somebody else")
+    (path.parent / "a.mtl").write_text("newmtl a\nmap_Kd stone.png\n")
+    (path.parent / "stone.png").write_text("S")
+    with pytest.raises(OutputError, match=r"stone\.png: another file of this name"):
+        write(load(path), target)
+    assert (target.parent / "a.mtl").read_text() == LIBRARY

@@ -18,16 +18,19 @@ LIBRARY = re.compile(
 
 @dataclass(frozen=True)
 class Names:
-    """Where the material library and the images go."""
+    """Where the material library, the images and those of bent normals go."""
 
     library: Path
     images: tuple[Path, ...]
+    bent: tuple[Path, ...]
 
 
-def names_beside(target: Path, ending: str, images: int, needed: Collection[Path]) -> Names:
+def names_beside(
+    target: Path, ending: str, images: int, bent: int, needed: Collection[Path]
+) -> Names:
     """Names beside the target that are free, or that an earlier bake took for the same target.
 
-    ending : of the images;  needed : files that may not be replaced
+    ending : of the images;  images, bent : how many;  needed : files that may not be replaced
     Raises OutputError where all are taken.
     """
     earlier = _mentioned(target)
@@ -42,7 +45,11 @@ def names_beside(target: Path, ending: str, images: int, needed: Collection[Path
                 return path
         raise OutputError(f"{target}: every name for its {suffix} is taken. Write it elsewhere.")
 
-    return Names(free(".mtl"), tuple(free(f"_ao{ending}") for _ in range(images)))
+    return Names(
+        library=free(".mtl"),
+        images=tuple(free(f"_ao{ending}") for _ in range(images)),
+        bent=tuple(free(f"_bent_normal{ending}") for _ in range(bent)),
+    )
 
 
 def _mentioned(target: Path) -> set[str]:
