@@ -156,8 +156,8 @@ def _vertices(scene: Scene, job: Job) -> tuple[Bake, Notes]:
     from aobake.bake import bake_vertices
     from aobake.meshes import formats
 
-    store, bent = job.chosen.store, job.chosen.bake.bent_normals
-    said = formats.check_target(scene, job.output, store, bent_normals=bent)
+    chosen = job.chosen
+    said = formats.check_target(scene, job.output, chosen.store, chosen.bake.further)
     return bake_vertices, lambda _: said
 
 

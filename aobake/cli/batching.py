@@ -179,7 +179,7 @@ def _stale(ended: Ended) -> list[str]:
         return [*([f"removed {_some(removed)}."] if removed else []), *kept]
     if not ended.stale:
         return []
-    return [f"without an asset now: {_some(ended.stale)}. --prune removes them."]
+    return [f"outputs of no asset now: {_some(ended.stale)}. --prune removes them."]
 
 
 def _some(names: tuple[str, ...]) -> str:

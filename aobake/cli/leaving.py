@@ -1,7 +1,7 @@
 """Ctrl-C that works within a second, also where Python cannot act on it.
 
 A signal reaches Python code only between two of its own instructions: not while LLVM compiles a kernel
-(18 s when a machine bakes for the first time), and inside one of LLVM's callbacks the KeyboardInterrupt
+(for seconds when a machine bakes for the first time), and inside one of LLVM's callbacks the KeyboardInterrupt
 is dropped and the bake would go on. So a thread watches, and ends the process when it lingers.
 """
 

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["plan"]
 
-FILLED = 0.6  # of an image, that charts usually cover
-
 
 def plan(  # noqa: PLR0913 - one for each group of flags
     input: Path,
@@ -67,8 +65,7 @@ def plan(  # noqa: PLR0913 - one for each group of flags
     with leaving_promptly():
         scene = load(input, root=source.root, scene=source.scene, pose=source.pose)
         decided = texture_plan(scene, chosen) if texture else vertex_plan(scene, chosen)
-        texels = round(FILLED * (chosen.size * chosen.supersample) ** 2) if texture else None
-        cost = estimated(decided, scene, chosen, texels=texels)
+        cost = estimated(decided, scene, chosen, texture=texture)
     if as_json:
         terminal.say(json.dumps(_as_json(decided, cost), indent=2, ensure_ascii=False))
     else:

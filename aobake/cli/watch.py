@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from aobake import SettingsError
+from aobake import AobakeError, SettingsError
 from aobake.cli import terminal
 from aobake.cli.batching import (
     BatchFlags,
@@ -20,9 +22,13 @@ from aobake.cli.batching import (
 )
 from aobake.cli.options import BakeFlags
 
+if TYPE_CHECKING:
+    from aobake.batch.run import Batch
+
 __all__ = ["watch"]
 
 LOOK_MS = 500  # how often it is looked whether to stop
+PARTS = ".aobake-"  # how the names of all files begin that are not complete yet
 SETTLED_MS = 400  # without a change, before what changed is baked: exporters write in several steps
 
 
@@ -54,18 +60,45 @@ def watch(
     wanted = batch_of(folder, output, batch, bake, options, command="watch")
     stop = threading.Event()
     with stopping(stop), executor_here(wanted) as executor:
-        for _ in changes(Path(folder), stop):
-            with watching(quiet=options.quiet) as watcher:
-                ended = run_batch(wanted, lambda: nullcontext(executor), watcher=watcher, stop=stop)
+        for first in changes(Path(folder), written_by(wanted), stop):
+            try:
+                with watching(quiet=options.quiet) as watcher:
+                    ended = run_batch(
+                        wanted, lambda: nullcontext(executor), watcher=watcher, stop=stop
+                    )
+            except AobakeError as error:
+                if first:
+                    raise
+                terminal.error(str(error))  # the next change may be its cure
+                continue
             if not stop.is_set():
                 tell(ended, wanted, quiet=options.quiet)
     terminal.error("interrupted.")
     return 130
 
 
-def changes(folder: Path, stop: threading.Event) -> Iterator[None]:
-    """Once now, and then whenever something below the folder has changed and settled, until it is stopped.
+def written_by(batch: Batch) -> tuple[Path, ...]:
+    """The files and folders that a batch writes: a change there is none to bake for."""
+    from aobake.batch.page import files_beside
+    from aobake.batch.places import LocalFolder
 
+    places: list[Path | None] = [
+        batch.state,
+        batch.reports.data,
+        batch.reports.page,
+        batch.reports.junit,
+    ]
+    if batch.reports.page is not None:
+        places.append(files_beside(batch.reports.page))
+    if isinstance(batch.target, LocalFolder):
+        places.append(batch.target.folder)
+    return tuple(path for path in places if path is not None)
+
+
+def changes(folder: Path, ours: Sequence[Path], stop: threading.Event) -> Iterator[bool]:
+    """True now, and then False whenever something below the folder has changed and settled.
+
+    ours : files and folders whose changes do not count     stop : when set, it ends
     Raises SettingsError where watching is not possible.
     """
     try:
@@ -78,6 +111,7 @@ def changes(folder: Path, stop: threading.Event) -> Iterator[None]:
         raise SettingsError(f"{folder}: a folder on this machine is needed to watch.")
     events = watched(
         folder,
+        watch_filter=lambda _, path: counts(path, ours),
         stop_event=stop,
         debounce=4 * SETTLED_MS,
         step=SETTLED_MS,
@@ -86,9 +120,17 @@ def changes(folder: Path, stop: threading.Event) -> Iterator[None]:
         raise_interrupt=False,
     )
     next(events, None)  # watching begins before the first bake: nothing is missed meanwhile
-    yield
+    yield True
     for seen in events:
         if stop.is_set():
             return
         if seen:
-            yield
+            yield False
+
+
+def counts(path: str, ours: Sequence[Path]) -> bool:
+    """Whether a change of a file is one to bake for. ours : files and folders of which none is"""
+    where = Path(os.path.realpath(path))
+    if where.name.startswith(PARTS):
+        return False
+    return not any(where.is_relative_to(os.path.realpath(one)) for one in ours)

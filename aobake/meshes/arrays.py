@@ -33,9 +33,12 @@ def array_of(values: ArrayLike, what: str) -> NDArray[Any]:
 
 
 def rows_of_three(values: ArrayLike, dtype: type[ScalarT], what: str) -> NDArray[ScalarT]:
-    """(N, 3) C-ordered copy or view; (0, 3) for none; InputError for any other shape or kind."""
+    """(N, 3) C-ordered copy or view; (0, 3) for none; InputError for any other shape or kind.
+
+    It is aligned: what lies at an odd place of a file is copied, for Embree would refuse it.
+    """
     try:
-        array: NDArray[ScalarT] = np.ascontiguousarray(values, dtype)
+        array: NDArray[ScalarT] = np.require(values, dtype, ["C", "A"])
     except (TypeError, ValueError) as error:
         raise InputError(f"{what} are no array of numbers ({error}).") from error
     if array.size == 0:

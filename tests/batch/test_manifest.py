@@ -16,10 +16,11 @@ import pytest
 
 from aobake.batch.database import APPLICATION
 from aobake.batch.manifest import Manifest
+from aobake.batch.places import LocalFolder
 from aobake.batch.tasks import Outcome
 from aobake.errors import InputError, OutputError
 from aobake.settings import BakeSettings
-from tests.batch.workshop import Workshop
+from tests.batch.workshop import CountingFolder, Workshop
 from tests.support import ROOT
 
 
@@ -129,7 +130,7 @@ CHILD = """
 import os, signal, sys
 from pathlib import Path
 from dataclasses import replace
-from tests.batch.workshop import Workshop
+from tests.batch.workshop import CountingFolder, Workshop
 
 shop, fatal = Workshop(Path(sys.argv[1])), sys.argv[2]
 one = shop.planned("a.glb")
@@ -235,3 +236,31 @@ def test_a_look_before_there_is_a_target_finds_everything_new(shop: Workshop) ->
     shop.target.folder.rmdir()
     with Manifest.open(None, shop.source, shop.target) as manifest:
         assert [s.kind for s in manifest.standings(shop.all_planned())] == ["new"]
+
+
+def test_a_copy_that_goes_away_while_it_is_looked_at_ends_no_batch(
+    shop: Workshop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Somebody tidies up the target at the very moment."""
+    for name in ("a.glb", "b.glb"):
+        shop.asset(name, name)
+        shop.sides[name] = ("wood.png",)
+    shop.asset("wood.png", "brown")
+    looked_at: list[str] = []
+
+    def gone(folder: CountingFolder, name: str) -> str:
+        looked_at.append(name)
+        folder.path(name).unlink()
+        return LocalFolder.digest(folder, name)
+
+    with shop.open() as manifest:
+        manifest.begin({})
+        first, second = (shop.planned(name) for name in ("a.glb", "b.glb"))
+        manifest.standings([first, second])
+        manifest.record(first, shop.baked(first))
+        done = shop.baked(second)
+        with monkeypatch.context() as moment:
+            moment.setattr(CountingFolder, "digest", gone)
+            manifest.record(second, done)
+    assert looked_at == ["wood.png"]
+    assert shop.kinds() == {"a.glb": "output missing", "b.glb": "unchanged"}

@@ -67,11 +67,11 @@ class InThisProcess:
         self.waiting.append(done)
         self.after(task)
 
-    def finished(self, timeout: float) -> Sequence[Outcome]:
+    def finished(self, timeout: float) -> Sequence[Outcome]:  # noqa: ARG002 - nothing to wait for
         found, self.waiting = self.waiting, []
         return found
 
-    def stop(self, grace: float) -> Sequence[Outcome]:
+    def stop(self, grace: float) -> Sequence[Outcome]:  # noqa: ARG002 - nothing to wait for
         return self.finished(0.0)
 
     def close(self) -> None:

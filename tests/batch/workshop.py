@@ -17,7 +17,7 @@ from aobake.config import Configured
 from aobake.jobs import Job
 from aobake.settings import BakeSettings, ImageSettings, StoreSettings
 
-__all__ = ["SETTINGS", "Workshop", "digest"]
+__all__ = ["SETTINGS", "CountingFolder", "Workshop", "digest"]
 
 SETTINGS = BakeSettings(rays=16)
 

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from aobake.cli.batching import FolderOptions, batch_of
+from aobake.cli.watch import counts, written_by
 from tests.batch.test_run import CUBE
 from tests.conftest import Run
 from tests.support import one_line
@@ -89,6 +91,22 @@ def test_listed_commands_do_what_the_batch_does(run: Run, folder: Path, tmp_path
         assert (tmp_path / "listed" / name).read_bytes() == (tmp_path / "out" / name).read_bytes()
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such names")
+def test_what_no_command_line_can_bake_is_said_and_the_others_are_listed(
+    run: Run, folder: Path, tmp_path: Path
+) -> None:
+    (folder / "two\nlines.obj").write_text(CUBE, encoding="ascii")
+    (folder / "crate.stl").write_text("solid\nendsolid\n", encoding="ascii")
+    ran = run("batch", folder, "-o", tmp_path / "out", "--format", "glb", "--list-commands")
+    assert ran.status == 1
+    assert len(ran.out.splitlines()) == 1
+    assert "it's <b>.obj" in shlex.split(ran.out)[2]
+    assert "two lines.obj: its name cannot stand in a line" in ran.err
+    assert "crate.glb would also be written for crate.stl" in ran.err
+    dry = run("batch", folder, "-o", tmp_path / "out", "--format", "obj", "--dry-run")
+    assert "two lines.obj -> two lines.obj" in dry.out
+
+
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
@@ -100,6 +118,10 @@ def test_listed_commands_do_what_the_batch_does(run: Run, folder: Path, tmp_path
         (["in", "-o", "out", "--dry-run", "--list-commands"], ["--dry-run"]),
         (["in", "-o", "out", "--timeout", "soon"], ["--timeout", "soon"]),
         (["in", "-o", "out", "--proceses", "2"], ["--processes"]),
+        (["in", "-o", "out", "--format", "jpg"], ["--format is 'jpg'"]),
+        (["in", "-o", "out", "--report", "r.html"], ["--report r.html"]),
+        (["in", "-o", "out", "--report", "r.json", "--junit", "r.json"], ["--report r.json"]),
+        (["in", "-o", "s3://b/out", "--state", "s", "--list-commands"], ["--list-commands", "s3:"]),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_one_line(
@@ -121,7 +143,9 @@ def waiting_for(path: Path, process: subprocess.Popen[str]) -> None:
     end = time.monotonic() + LIMIT_S
     while not path.exists():
         assert process.poll() is None, process.communicate()
-        assert time.monotonic() < end, f"{path} never came"
+        if time.monotonic() > end:
+            process.kill()
+            pytest.fail(f"{path} never came: {process.communicate()}")
         time.sleep(0.05)
 
 
@@ -142,8 +166,8 @@ def test_an_interrupted_batch_leaves_a_state_that_the_next_one_goes_on_from(
     out = tmp_path / "out"
     (folder / "endless.obj").write_text(CUBE, encoding="ascii")
     (folder / "heroes" / "aobake.toml").write_text("rays = 8\n", encoding="ascii")
-    slow = '[files."endless.obj"]\nrays = 1048576\nsubdivide = 1\n'.replace("subdivide = 1\n", "")
-    (folder / "aobake.toml").write_text(f"rays = 4\n{slow}", encoding="ascii")
+    slow = 'rays = 4\n[files."endless.obj"]\nrays = 65536\n'
+    (folder / "aobake.toml").write_text(slow, encoding="ascii")
     process = start("batch", folder, "-o", out, "--pictures", "none", "--grace", 60)
     waiting_for(out / ".aobake" / "batch.sqlite", process)
     process.send_signal(signal.SIGINT)
@@ -159,12 +183,33 @@ def test_an_interrupted_batch_leaves_a_state_that_the_next_one_goes_on_from(
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGINT for another process")
 def test_a_watched_folder_is_baked_when_it_changes(folder: Path, tmp_path: Path) -> None:
     pytest.importorskip("watchfiles", reason="aobake[watch] is not installed")
-    out = tmp_path / "out"
-    process = start("watch", folder, "-o", out, "--pictures", "none")
+    out, settings = folder / "baked", folder / "aobake.toml"
+    settings.write_text("[preset.hero]\nrays = 4\n", encoding="ascii")
+    flags = ("--skip", "baked/", "--preset", "hero", "--pictures", "none")
+    process = start("watch", folder, "-o", out, *flags)
+    assert process.stderr is not None
     waiting_for(out / "report.json", process)
+    settings.write_text("rays = 4\n", encoding="ascii")
+    while "--preset is 'hero'" not in (line := process.stderr.readline()):  # and it goes on
+        assert line, "it ended"
+    settings.write_text("[preset.hero]\nrays = 4\n", encoding="ascii")
     (folder / "late.obj").write_text(CUBE, encoding="ascii")
     waiting_for(out / "late.obj", process)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=LIMIT_S)
     assert process.returncode == 130, err
     assert "Traceback" not in err
+
+
+def test_what_a_batch_writes_is_no_change_to_bake_for(tmp_path: Path) -> None:
+    """Where outputs lie among the assets, a watched folder would be baked without an end."""
+    out, junit = tmp_path / "out", tmp_path / "junit.xml"
+    flags = FolderOptions(report=tmp_path / "r.json", junit=junit, state=tmp_path / "state")
+    ours = written_by(batch_of(str(tmp_path), str(out), None, None, flags, command="watch"))
+    own = (
+        out / "a.glb", out / ".aobake" / "lock", junit, tmp_path / "r.json", tmp_path / "r.html",
+        tmp_path / "r_files" / "0.html", tmp_path / "state" / "batch.sqlite", tmp_path / ".aobake-0-1.part",
+    )  # fmt: skip
+    assert [path.name for path in own if counts(str(path), ours)] == []
+    assert counts(str(tmp_path / "outer.glb"), ours)
+    assert counts(str(tmp_path / "aobake.toml"), ours)

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from aobake import BakeSettings, InputError, Instance, Material, Mesh, Scene, bake_vertices
+from aobake.batch.pictures import thumbnails
 from tests.scenes import TURNED, box, icosphere
 
 VERTICES, FACES = box()
@@ -69,6 +70,19 @@ def test_an_empty_mesh_is_a_mesh(shape: tuple[int, ...]) -> None:
     scene = Scene.from_arrays(np.zeros(shape), np.zeros(shape, np.int32))
     assert (scene.vertices, scene.triangles) == (0, 0)
     assert [ao.shape for ao in bake_vertices(scene).ao] == [(0,)]
+
+
+def test_arrays_at_an_odd_place_of_a_file_can_be_baked_and_seen() -> None:
+    """Embree takes numbers at multiples of four bytes alone; a GLB may hold its indices anywhere."""
+    data = b"--" + FACES.astype(np.int32).tobytes()
+    odd = np.frombuffer(data, np.int32, offset=2).reshape(-1, 3)
+    assert not odd.flags.aligned
+    mesh = Mesh(vertices=VERTICES, faces=odd)
+    apart = np.eye(4)
+    apart[0, 3] = 5.0
+    scene = Scene(meshes=(mesh,), instances=(Instance(mesh=0), Instance(mesh=0, transform=apart)))
+    assert scene.meshes[0].faces.flags.aligned
+    assert set(thumbnails(bake_vertices(scene, BakeSettings(rays=16)))) == {"before", "after"}
 
 
 def test_a_scene_cannot_be_changed_and_changes_nothing() -> None:
