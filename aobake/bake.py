@@ -82,7 +82,8 @@ def bake_vertices(
             sky = sky_over(prepared, some, len(some), ground, settings)
             traced = occlusion_at(prepared, some, ground, settings, report, sky)
             found = copied(traced, points, alike)
-    ao, error = _per_instance(scene, prepared, found)
+    ao = _per_instance(scene, prepared, found.mean, 1.0)
+    error = _per_instance(scene, prepared, found.standard_error, 0.0)
     found_out = _findings(scene, prepared, found)
     if settings.strict:
         refuse(scene, found_out)
@@ -93,6 +94,9 @@ def bake_vertices(
         ao=ao,
         standard_error=error,
         bent_normals=None if found.bent is None else _bent_normals(scene, prepared, found.bent),
+        mean_distance=None
+        if found.distance is None or prepared.reach is None
+        else _per_instance(scene, prepared, found.distance, prepared.reach),
         rays=int(found.rays.sum(dtype=np.int64)),
         fixed_rays=_fixed_rays(found, settings, fitted=fitted),
         seconds=seconds,
@@ -148,25 +152,22 @@ def _fixed_rays(found: Estimates, settings: BakeSettings, *, fitted: bool) -> in
 
 
 def _per_instance(
-    scene: Scene, prepared: Prepared, found: Estimates
-) -> tuple[list[NDArray[np.float32]], list[NDArray[np.float32]]]:
-    """Values and errors, one array per instance; vertices that share a place and a normal share them."""
-    means, errors = [], []
-    first = 0
+    scene: Scene, prepared: Prepared, found: NDArray[np.float32], otherwise: float
+) -> list[NDArray[np.float32]]:
+    """Values of one array per instance; vertices that share a place and a normal share them.
+
+    found : (P,) at the points; otherwise : what vertices have that are none
+    """
+    several, first = [], 0
     for (instance, mesh), stands in zip(scene.placed(), prepared.placed, strict=True):
-        mean, error = (
-            np.ones(len(mesh.vertices), np.float32),
-            np.zeros(len(mesh.vertices), np.float32),
-        )
+        values = np.full(len(mesh.vertices), otherwise, np.float32)
         if stands is not None:
             asked = np.flatnonzero(asked_vertices(instance, stands[1]))
-            mean[asked] = found.mean[first : first + len(asked)]
-            error[asked] = found.standard_error[first : first + len(asked)]
-            mean, error = mean[stands[1].same_as], error[stands[1].same_as]
+            values[asked] = found[first : first + len(asked)]
+            values = values[stands[1].same_as]
             first += len(asked)
-        means.append(mean)
-        errors.append(error)
-    return means, errors
+        several.append(values)
+    return several
 
 
 def _bent_normals(

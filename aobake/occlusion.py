@@ -54,7 +54,7 @@ def occlusion_at(
     """
     sky = sky or OpenSky({})
     if prepared.own is None:
-        request = _request(points, ground, sky.over(EVERYTHING, points))
+        request = _request(prepared, points, ground, sky.over(EVERYTHING, points))
         return _among(
             prepared, prepared.placements, prepared.world, points, request, settings, progress
         )
@@ -63,13 +63,13 @@ def occlusion_at(
             "occluders is 'own', but points that are given alone are on no object; "
             "name those that occlude, or use all."
         )
-    result, done = Estimates.blank(len(points), bent=settings.bent_normals), 0
+    result, done = _blank(prepared, points, settings), 0
     for owner in np.unique(points.owners).tolist():
         chosen, placements = np.flatnonzero(points.owners == owner), prepared.own[owner]
         world = build_world(prepared.parts, placements)
         report = _after(done, len(points), progress)
         mine = points.only(chosen)
-        request = _request(mine, ground, sky.over(owner, mine))
+        request = _request(prepared, mine, ground, sky.over(owner, mine))
         result.put(chosen, _among(prepared, placements, world, mine, request, settings, report))
         done += len(chosen)
     return result
@@ -88,7 +88,7 @@ def _among(
     found, unresolved = regions(points.positions, points.detail, world.frame)
     if len(found) == 1:
         return estimate(world, request, settings, progress)
-    result, done = Estimates.blank(len(points), bent=settings.bent_normals), 0
+    result, done = _blank(prepared, points, settings), 0
     for center, chosen in found:
         if center is not None:
             world = build_world(prepared.parts, placements, center, prepared.watched)
@@ -97,6 +97,10 @@ def _among(
         done += len(chosen)
     result.states[unresolved] = UNRESOLVED
     return result
+
+
+def _blank(prepared: Prepared, points: SurfacePoints, settings: TraceSettings) -> Estimates:
+    return Estimates.blank(len(points), bent=settings.bent_normals, reach=prepared.reach)
 
 
 def _after(before: int, count: int, progress: Progress | None) -> Progress | None:
@@ -110,11 +114,14 @@ def compile_for(
     prepared: Prepared, points: SurfacePoints, ground: float | None, settings: TraceSettings
 ) -> None:
     """Compile the kernels that occlusion_at will need, in the calling thread."""
-    compile_kernels(prepared.world, _request(points, ground), settings)
+    compile_kernels(prepared.world, _request(prepared, points, ground), settings)
 
 
 def _request(
-    points: SurfacePoints, ground: float | None, opened: NDArray[np.bool_] | None = None
+    prepared: Prepared,
+    points: SurfacePoints,
+    ground: float | None,
+    opened: NDArray[np.bool_] | None = None,
 ) -> Request:
     """The points as the tracer wants them."""
     return Request(
@@ -124,6 +131,7 @@ def _request(
         numbers=points.numbers,
         ground=ground,
         open=opened,
+        reach=prepared.reach,
     )
 
 

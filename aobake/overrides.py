@@ -20,6 +20,7 @@ _SETTINGS: Mapping[str, tuple[str, object, object]] = {
     "exclude": ("exclude", (), None),
     "backfaces": ("backfaces", "occlude", "ignore"),
     "bent_normals": ("bent_normals", False, True),
+    "mean_distance": ("mean_distance", False, True),
     "method": ("method", "point", "lsq"),
     "normal_map": ("normal_map", False, True),
     "blend": ("blend", "replace", "multiply"),

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from aobake.errors import SettingsError
 from aobake.overrides import forced
 from aobake.planning.directions import direction_effects
 from aobake.planning.effect import Effect, Plan
@@ -35,7 +36,12 @@ def plan(scene: Scene, settings: BakeSettings | None = None) -> Plan:
 
 
 def texture_plan(scene: Scene, settings: BakeSettings | None = None) -> Plan:
-    """The same for a bake to a texture."""
+    """The same for a bake to a texture, which has no place for mean distances: SettingsError."""
+    if settings is not None and settings.mean_distance:
+        raise SettingsError(
+            "mean_distance is kept at vertices. In a texture, bake with max_distance and falloff linear: its values "
+            "times max_distance are the mean distances."
+        )
     settings = _settled(scene, settings)
     effects = {**occluder_effects(scene, settings), **_shared(scene, settings)}
     effects["sharing"] = Effect(

@@ -14,6 +14,7 @@ from aobake.meshes.surface import Surface
 from aobake.prepare import Prepared, turned_normals
 from aobake.tracing.compiled import read_only
 from aobake.tracing.interpolation import interpolate
+from aobake.tracing.rows import any_in_rows
 
 __all__ = ["SurfacePoints", "asked_vertices", "given_points", "points_on_faces", "vertex_points"]
 
@@ -43,7 +44,9 @@ class SurfacePoints:
     owners: NDArray[np.int32]
 
     def only(self, chosen: NDArray[np.int64]) -> SurfacePoints:
-        """Some of the points, by their place in these arrays."""
+        """Some of the points, by their place in these arrays, which rises; itself where that is all of them."""
+        if len(chosen) == len(self):
+            return self
         return SurfacePoints(
             positions=self.positions[chosen],
             normals=self.normals[chosen],
@@ -100,8 +103,10 @@ def vertex_points(scene: Scene, prepared: Prepared) -> SurfacePoints:
         if stands is not None:
             linear, shift = instance.transform[:3, :3], instance.transform[:3, 3]
             rows = slice(ends[number] - len(chosen), ends[number])
-            points.positions[rows] = mesh.vertices[chosen] @ linear.T + shift
-            points.normals[rows] = turned_normals(stands[1].normals[chosen], linear)
+            # take: a third of the time that indexing rows takes
+            points.positions[rows] = mesh.vertices.take(chosen, axis=0) @ linear.T + shift
+            own = stands[1].normals.take(chosen, axis=0)
+            points.normals[rows] = turned_normals(own, linear)
             points.detail[rows] = stretches[number] * stands[1].detail[chosen]
             points.numbers[rows] = chosen + first
             points.owners[rows] = number
@@ -123,7 +128,7 @@ def _room_for(count: int) -> SurfacePoints:
 def asked_vertices(instance: Instance, surface: Surface) -> NDArray[np.bool_]:
     """(V,) the vertices to trace from; none where the transform leaves their normals no direction."""
     turned = turned_normals(surface.normals, instance.transform[:3, :3])
-    return surface.asked & turned.any(axis=1)
+    return surface.asked & any_in_rows(turned)
 
 
 def points_on_faces(

@@ -38,6 +38,8 @@ __all__ = [
 FloatArray = NDArray[np.float64]
 SettingsT = TypeVar("SettingsT", bound=TraceSettings)
 
+FARTHEST = float(np.finfo(np.float32).max)  # a distance that can still be kept
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Spaces:
@@ -58,6 +60,7 @@ class Prepared:
 
     placements : what occludes; placed : what is baked
     own : where each instance is occluded by itself alone, its own placements; None: all are occluded by all
+    reach : how far a ray counts at most in a mean distance, in scene units; None: nobody asks for one
     warnings : what could not be used, one line each
     """
 
@@ -68,7 +71,8 @@ class Prepared:
     world: World
     watched: Watched | None
     own: Sequence[Sequence[Placement]] | None
-    warnings: tuple[str, ...] = ()
+    reach: float | None
+    warnings: tuple[str, ...]
 
     @cached_property
     def spaces(self) -> Spaces:
@@ -143,8 +147,17 @@ def build(
         world,
         watched,
         own if by_themselves else None,
+        _reach(scene, settings),
         alpha.warnings,
     )
+
+
+def _reach(scene: Scene, settings: TraceSettings) -> float | None:
+    """What stands for the distance of a ray that meets nothing."""
+    if not settings.mean_distance:
+        return None
+    length = diagonal(scene) if settings.max_distance is None else settings.max_distance
+    return min(length, FARTHEST)
 
 
 def _alpha(scene: Scene, settings: TraceSettings) -> SceneAlpha:

@@ -17,7 +17,7 @@ from aobake.meshes import formats
 from aobake.meshes.lightmap import Lightmap
 from aobake.meshes.scene import Scene
 from aobake.plan import Plan
-from aobake.settings import BakeSettings, ImageSettings, StoreSettings
+from aobake.settings import BakeSettings, Further, ImageSettings, StoreSettings
 
 __all__ = ["BakedTexture", "BakedVertices", "Estimate", "save"]
 
@@ -47,6 +47,9 @@ class BakedVertices:
     standard_error : the same shapes; 0 where nothing had to be estimated
     bent_normals : one (V_i, 3) float32 array per instance, the mean open directions at unit length in the
         space of its mesh, as its normals are; None where they were not asked for
+    mean_distance : one (V_i,) float32 array per instance, how far rays from there get in the mean, in scene
+        units; a ray counts no farther than max_distance, or the diagonal of the scene; None where it was not
+        asked for
     rays : rays spent on the whole scene
     fixed_rays : those that the same number at every point would have taken for the same root mean square
         error, by the law of the standard error; None where no tolerance was asked for
@@ -66,6 +69,16 @@ class BakedVertices:
     findings: tuple[Finding, ...]
     warnings: tuple[str, ...]
     bent_normals: list[Float32Array] | None = None
+    mean_distance: list[Float32Array] | None = None
+
+    @property
+    def further(self) -> Mapping[Further, list[Float32Array]]:
+        """What was asked for besides occlusion, one array per instance each."""
+        kept: dict[Further, list[Float32Array] | None] = {
+            "bent_normals": self.bent_normals,
+            "mean_distance": self.mean_distance,
+        }
+        return {name: values for name, values in kept.items() if values is not None}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -154,6 +167,5 @@ def save(
         formats.check_texture_target(baked.scene, target, image, baked.lightmap)
         return formats.write_texture_ao(baked.scene, baked.lightmap, target, image)
     store = store or StoreSettings()
-    bent = baked.bent_normals
-    formats.check_target(baked.scene, target, store, bent_normals=bent is not None)
-    return formats.write_vertex_ao(baked.scene, baked.ao, target, store, bent)
+    formats.check_target(baked.scene, target, store, baked.further)
+    return formats.write_vertex_ao(baked.scene, baked.ao, target, store, baked.further)

@@ -26,6 +26,7 @@ __all__ = [
     "Distribution",
     "Encoding",
     "Falloff",
+    "Further",
     "GroundAxis",
     "ImageSettings",
     "Method",
@@ -50,6 +51,7 @@ AtlasScope = Literal["scene", "material", "mesh"]
 Denoise = Literal["auto", "on", "off"]
 Blend = Literal["replace", "multiply"]
 BentSpace = Literal["tangent", "object"]
+Further = Literal["bent_normals", "mean_distance"]
 Encoding = Literal["8", "16", "half", "float"]
 Pack = Literal["separate", "orm"]
 UV_CHOICES = ("auto", "keep", "unwrap")
@@ -115,13 +117,17 @@ class TraceSettings:
 
     occluders: tuple[str, ...] = ("all",)
     """What occludes: all, own (each object itself alone), or names of meshes, nodes or materials, in which *
-    stands for any letters. Once for each name."""
+    stands for any letters; extras:KEY and extras:KEY=VALUE take what has this glTF extra. Once for each."""
 
     exclude: tuple[str, ...] = ()
     """Names of what does not occlude, as those of occluders; it is baked like the rest. Once for each."""
 
     bent_normals: bool = False
     """Whether the mean direction that is open is kept as well, at each vertex: _BENT_NORMAL in glTF."""
+
+    mean_distance: bool = False
+    """Whether the mean distance to what is around is kept as well, at each vertex: _MEAN_DISTANCE in glTF,
+    mean_distance in PLY. Counted up to max_distance, or to the diagonal of the scene."""
 
     effect: tuple[str, ...] = ()
     """Switches an effect of the plan by hand: NAME=on or NAME=off. Once for each effect."""
@@ -160,13 +166,18 @@ class TraceSettings:
             raise SettingsError(f"occluders is {self.occluders!r}; all, own or names are needed.")
         forced(self.effect)
         _whole("max_hole", self.max_hole, 3, 1_000_000)
-        for name in ("strict", "repair", "bent_normals"):
+        for name in ("strict", "repair", "bent_normals", "mean_distance"):
             if not isinstance(getattr(self, name), bool):
                 raise SettingsError(f"{name} is {getattr(self, name)!r}; True or False is needed.")
         if self.falloff != "none" and self.max_distance is None:
             raise SettingsError(
                 f"falloff is {self.falloff!r}, but nothing says where it ends: give max_distance as well."
             )
+
+    @property
+    def further(self) -> tuple[Further, ...]:
+        """What is kept at vertices besides occlusion."""
+        return tuple(name for name in get_args(Further) if getattr(self, name))
 
     def _settle_max_distance(self) -> None:
         """A length is a number; a share of a diagonal stays in words until there is a scene."""
@@ -302,9 +313,10 @@ class BakeSettings(AtlasSettings, VertexSettings, TraceSettings):
         defaults = {field.name: field.default for field in fields(self)}
         for name, value in switched(self.effect, values, defaults).items():
             object.__setattr__(self, name, value)
-        if self.bent_normals and self.method == "lsq":
+        if self.method == "lsq" and (self.bent_normals or self.mean_distance):
+            name = "bent_normals" if self.bent_normals else "mean_distance"
             raise SettingsError(
-                "bent_normals are those of points; method is 'lsq', which fits values. Leave one of them out."
+                f"{name} is found at points, and method is 'lsq', which fits values. Leave one of them out."
             )
 
 

@@ -72,7 +72,8 @@ def _by_themselves(
 def _alike(one: Instance, other: Instance, settings: TraceSettings) -> bool:
     """Whether one transform is the other followed by what changes no occlusion.
 
-    Directions do change under a turn, so bent normals ask for placements that are only moved.
+    Directions do change under a turn, so bent normals ask for placements that are only moved; and distances
+    under a scale.
     """
     first, second = one.transform[:3, :3], other.transform[:3, :3]
     if not (np.isfinite(one.transform).all() and np.isfinite(other.transform).all()):
@@ -83,7 +84,8 @@ def _alike(one: Instance, other: Instance, settings: TraceSettings) -> bool:
         return False
     if settings.bent_normals:
         return _same(first, second, size**0.5)
-    ratio = 1.0 if settings.max_distance is not None else size_again / size
+    keeps_size = settings.max_distance is not None or settings.mean_distance
+    ratio = 1.0 if keeps_size else size_again / size
     return _same(squared * ratio, again, size_again)
 
 

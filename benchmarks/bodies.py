@@ -9,7 +9,7 @@ from scan import scan
 import aobake
 from aobake.demo import hall
 
-__all__ = ["bodies", "coarse_bodies"]
+__all__ = ["bodies", "coarse_bodies", "twigs_above_ground"]
 
 FloatArray = NDArray[np.float64]
 CORNERS = np.array(
@@ -98,3 +98,21 @@ def _leaves(count: int) -> tuple[FloatArray, NDArray[np.int32]]:
     return corners.reshape(-1, 3), (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3).astype(
         np.int32
     )
+
+
+def twigs_above_ground(count: int = 600) -> tuple[FloatArray, NDArray[np.int32]]:
+    """A square of 30 x 30 vertices below thin prisms that lie anyhow in a ball, before an open sky."""
+    rng = np.random.default_rng(7)
+    ground, cells = _terrain(29, 0.0)
+    middle = rng.standard_normal((count, 3))
+    middle *= (rng.random(count) ** (1 / 3) / np.linalg.norm(middle, axis=1))[:, None]
+    u, v, along = np.linalg.qr(rng.standard_normal((count, 3, 3))).Q.transpose(2, 0, 1)
+    corners = [
+        middle + end * 0.25 * along + 0.006 * (np.cos(turn) * u + np.sin(turn) * v)
+        for end in (-1.0, 1.0)
+        for turn in (0.0, 2.1, 4.2)
+    ]
+    prism = np.array([[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]])
+    twigs = (len(ground) + 6 * np.arange(count)[:, None, None] + prism).reshape(-1, 3)
+    vertices = np.concatenate([ground - [0.0, 0.0, 1.05], np.stack(corners, axis=1).reshape(-1, 3)])
+    return vertices, np.concatenate([cells, twigs]).astype(np.int32)

@@ -4,23 +4,25 @@
 
 Costs are ratios of processor seconds of tracing, taken in turn within one run, since machines are shared;
 medians are quoted. An effect that is off is measured against a kernel that was written without any of them.
-Estimates of `aobake plan` are compared with the seconds that a bake then takes, for the demo scene and for
-the assets that are named.
+Estimates of `aobake plan` are compared with what a bake then takes, for the demo scene, five generated bodies and
+the assets that are named: by processor seconds of one thread, so that what else a machine does is not in them.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import statistics
-import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from bodies import bodies
 from cutouts import FloatArray, cards_mesh, scene_of
 from scan import scan
+from tables import Cell, Spread, Table
 
 import aobake
 from aobake import BakeSettings
@@ -29,6 +31,7 @@ from aobake.demo.shapes import ball
 from aobake.meshes.scene import Instance, Scene
 from aobake.meshes.surfaces import surfaces_of
 from aobake.open_sky import sky_over
+from aobake.plan import texture_plan
 from aobake.planning.cost import estimated
 from aobake.points import vertex_points
 from aobake.prepare import build
@@ -43,7 +46,7 @@ POINTS = 2000  # of the comparison of kernels, which takes one thread
 
 @tight_kernel
 def trace_plainly(function, scene, points, seed, sets, rays, scratch, out):
-    """kernels.trace as it was before it could do anything but occlusion."""
+    """kernels.trace, its error included, if it could do nothing but occlusion."""
     packet, words, masks, frame = scratch
     origins, normals, numbers = points
     valid, counts = masks[:8], masks[8:16]
@@ -54,6 +57,7 @@ def trace_plainly(function, scene, points, seed, sets, rays, scratch, out):
         kernels.set_out(packet, origins[point])
         chosen = sets[np.int64(bits & np.uint64(len(sets) - 1))]
         total, rough, counted = 0.0, 0.0, 0
+        apart, whole = 0.0, 0
         before = -1.0
         for number in range(len(chosen)):
             kernels.aim(packet, chosen[number], frame, np.float32(np.inf))
@@ -61,15 +65,23 @@ def trace_plainly(function, scene, points, seed, sets, rays, scratch, out):
                 counts[k] = -1 if k < rays - 8 * number else 0
                 valid[k] = counts[k]
             kernels.call_packet(function, masks.ctypes.data, scene, packet.ctypes.data)
+            lanes, inside, squares = 0, 0.0, 0.0
             for k in range(8):
                 if counts[k] != 0:
                     value = 1.0 if packet[8 * kernels.FAR + k] >= 0.0 else 0.0
                     total += value
-                    counted += 1
+                    lanes += 1
+                    inside += value
+                    squares += value * value
                     if before >= 0.0:
                         rough += (value - before) * (value - before)
                     before = value
+            counted += lanes
+            if lanes == 8:
+                apart += 8.0 * squares - inside * inside
+                whole += 1
         out[point, 0], out[point, 1], out[point, 2] = total, rough, counted
+        out[point, 3], out[point, 4] = apart, whole
 
 
 def cost_of_nothing(scene: Scene, rays: int, repeats: int) -> list[float]:
@@ -82,12 +94,12 @@ def cost_of_nothing(scene: Scene, rays: int, repeats: int) -> list[float]:
     normals, numbers = points.normals.astype(np.float32), points.numbers
     functions, tree = embree.functions(), prepared.world.tree.address
     sets, seed = direction_sets(rays), np.uint64(0)
-    memory, sums = kernels.scratch(), np.empty((len(origins), 3))
+    memory, sums = kernels.scratch(), np.empty((len(origins), kernels.SUMS))
 
     def whole() -> None:
         kernels.trace(
             (functions.occluded8, functions.intersect8), tree, origins, normals, None, numbers,
-            seed, sets, rays, np.float32(np.inf), None, None, memory, sums, None,
+            seed, sets, rays, np.float32(np.inf), None, None, memory, sums, None, None,
         )  # fmt: skip
 
     def plain() -> None:
@@ -145,6 +157,7 @@ def costs_when_on(scene: Scene, rays: int, repeats: int) -> Mapping[str, list[fl
         "distribution (uniform)": (replace(plain, distribution="uniform"), plain),
         "spread (100 degrees)": (replace(plain, spread=100.0), plain),
         "bent_normals": (replace(plain, bent_normals=True), plain),
+        "mean_distance": (replace(plain, mean_distance=True), plain),
         "occluders (own)": (replace(plain, occluders=("own",)), plain),
     }
     found = {
@@ -205,20 +218,80 @@ def saved(scene: Scene, rays: int, repeats: int, **also: object) -> tuple[float,
     return statistics.median(rows[0]), statistics.median(rows[1])
 
 
-def estimates(assets: list[Path], rays: int) -> list[tuple[str, float, float]]:
-    """(name, seconds that were estimated, seconds that were taken)."""
-    found = []
-    scenes = [("demo", hall()), *((path.name, aobake.load(path)) for path in assets)]
-    for name, scene in scenes:
-        settings = BakeSettings(rays=rays)
-        cost = estimated(aobake.plan(scene, settings), scene, settings)
-        taken = aobake.bake_vertices(scene, settings).seconds
-        found.append((name, cost.seconds, sum(taken.values()) - taken["compile"]))
-    return found
+def estimates(scenes: Mapping[str, Scene], rays: int, repeats: int) -> Iterator[list[Cell]]:
+    """Name, and for each kind of bake what was estimated over what was taken: medians, and of which rays."""
+    plain = BakeSettings(rays=rays, threads=1, size=512)
+    for name, scene in scenes.items():
+        row: list[Cell] = [name]
+        for settings in (plain, replace(plain, tolerance=0.01)):
+            row += _told(scene, settings, False, repeats)
+        yield row + _told(scene, replace(plain, rays=max(1, rays // 4)), True, repeats)
 
 
-def shown(values: list[float]) -> str:
-    return f"{statistics.median(values):.3f} ({min(values):.3f} to {max(values):.3f})"
+def _told(scene: Scene, settings: BakeSettings, texture: bool, repeats: int) -> list[Cell]:
+    """Estimated over taken: processor seconds, and rays."""
+    bake = aobake.bake_texture if texture else aobake.bake_vertices
+    decided = (texture_plan if texture else aobake.plan)(scene, settings)
+    seconds, rays = [], []
+    with counting_processor_time():
+        bake(scene, replace(settings, rays=1, tolerance=None, size=256))  # loads and compiles
+        for _ in range(repeats):
+            cost = estimated(decided, scene, settings, texture=texture)
+            baked = bake(scene, settings)
+            taken = sum(baked.seconds.values()) - baked.seconds["compile"]
+            seconds.append(cost.seconds / taken)
+            rays.append(cost.rays / max(1, baked.rays))
+    return [statistics.median(seconds), statistics.median(rays)]
+
+
+@contextlib.contextmanager
+def counting_processor_time() -> Iterator[None]:
+    """Let the clock of stages and probes tell processor time, of all threads."""
+    clock = time.perf_counter
+    time.perf_counter = time.process_time
+    try:
+        yield
+    finally:
+        time.perf_counter = clock
+
+
+def tables(faces: int, rays: int, repeats: int, assets: list[Path]) -> Iterator[Table]:
+    """What is on, what is off, what planning saves, and what it estimates."""
+    scene = Scene.from_arrays(*scan(faces), name="scan")
+    facts = {"triangles": scene.triangles, "rays": rays}
+    on = costs_when_on(scene, rays, repeats)
+    rows = [[name, Spread.of(values)] for name, values in on.items()]
+    yield Table("What is on", ("effect", "when on, against without"), rows, facts)
+    nothing = cost_of_nothing(scene, rays, 20 * repeats)  # short, and so noisy
+    rows = [["all of the kernel's, against a kernel without them", Spread.of(nothing)]]
+    for name, values in costs_of_looking(scene, rays, repeats).items():
+        share = f"{name}: looking for it in vain, as a share of the bake"
+        rows.append([share, Spread.of(values)])
+    yield Table("What is off", ("what", "cost"), rows, facts)
+    scenes = {
+        "demo": hall(),
+        "convex body": convex_body(),
+        "foliage": scene_of(cards_mesh(500, 0), "MASK"),
+    }
+    rows = []
+    for name, of in scenes.items():
+        planned, forced = saved(of, rays, max(1, repeats // 2))
+        rows.append([name, planned, forced, f"{1.0 - planned / forced:.0%}"])
+    yield Table(
+        "What planning saves", ("scene", "as planned, s", "all on, s", "saved"), rows, facts
+    )
+    named = {path.name: aobake.load(path) for path in assets}
+    columns = ["asset"]
+    for kind in ("fixed", "tolerance 0.01", "texture"):
+        columns += [f"{kind}: seconds", "rays"]
+    rows = list(estimates({**bodies(), **named}, rays, max(1, repeats // 2)))
+    facts = {"rays": rays, "size": 512, "threads": 1}
+    yield Table("Estimated over taken", tuple(columns), rows, facts)
+
+
+def run(quick: bool) -> Iterator[Table]:
+    """A scan, and the demo scene."""
+    yield from tables(*((4_000, 32, 1) if quick else (40_000, 256, 5)), assets=[])
 
 
 def main() -> None:
@@ -228,31 +301,8 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("assets", nargs="*", type=Path)
     asked = parser.parse_args()
-    scene = Scene.from_arrays(*scan(asked.faces), name="scan")
-    print(
-        f"{scene.triangles} faces, {asked.rays} rays, median of {asked.repeats} (least to most)\n"
-    )
-    print("| effect | when on, against without |\n| --- | --- |")
-    for name, values in costs_when_on(scene, asked.rays, asked.repeats).items():
-        print(f"| {name} | {shown(values)} |")
-        sys.stdout.flush()
-    print("\n| what is off | cost |\n| --- | --- |")
-    nothing = cost_of_nothing(scene, asked.rays, 10 * asked.repeats)  # short, and so noisy
-    print(f"| all of the kernel's, against a kernel without them | {shown(nothing)} |")
-    for name, values in costs_of_looking(scene, asked.rays, asked.repeats).items():
-        print(f"| {name}: looking for it in vain, as a share of the bake | {shown(values)} |")
-    print("\n| scene | as planned, s | all on, s | saved |\n| --- | --- | --- | --- |")
-    scenes = {
-        "demo": hall(),
-        "convex body": convex_body(),
-        "foliage": scene_of(cards_mesh(500, 0), "MASK"),
-    }
-    for name, of in scenes.items():
-        planned, forced = saved(of, asked.rays, max(1, asked.repeats // 2))
-        print(f"| {name} | {planned:.2f} | {forced:.2f} | {1.0 - planned / forced:.0%} |")
-    print("\n| asset | estimated, s | taken, s | ratio |\n| --- | --- | --- | --- |")
-    for name, guess, taken in estimates(asked.assets, asked.rays):
-        print(f"| {name} | {guess:.2f} | {taken:.2f} | {guess / taken:.2f} |")
+    for table in tables(asked.faces, asked.rays, asked.repeats, asked.assets):
+        print(table.markdown(), flush=True)
 
 
 if __name__ == "__main__":

@@ -4,22 +4,24 @@
 
 Prints a Markdown table: the share of points whose true error is within two and four of its standard errors
 (93 % and 99 % are asked for), and how wide the bars are (at most 1.5 is asked for). Without meshes: a
-generated scan, the demo scene and a coarse scan.
+generated scan, the demo scene, a coarse scan, a town, terrain, leaves, and what is hardest: twigs above ground.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from bodies import bodies, twigs_above_ground
 from numpy.typing import NDArray
 from scan import scan
+from tables import Table
 
 import aobake
-from aobake.demo import hall
 from aobake.study.bench import bench_of
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -53,39 +55,53 @@ def closed_forms(way: dict[str, object]) -> Points:
     return np.concatenate(errors), np.concatenate(bars)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("meshes", nargs="*")
-    parser.add_argument("--points", type=int, default=3000)
-    parser.add_argument("--plot", type=Path)
-    asked = parser.parse_args()
-    scenes = {Path(name).stem: aobake.load(name) for name in asked.meshes} or {
-        "scan, 20,000 faces": aobake.Scene.from_arrays(*scan(20_000)),
-        "demo scene": hall(),
-        "scan, 2,000 faces": aobake.Scene.from_arrays(*scan(2000)),
-    }
-    rows = [("closed forms", way, closed_forms(way)) for way in WAYS]
+Row = tuple[str, dict[str, object], Points]
+
+
+def rows_of(scenes: dict[str, aobake.Scene], points: int, reference: int) -> list[Row]:
+    """(scene, way to bake, errors and bars), closed forms first."""
+    rows: list[Row] = [("closed forms", way, closed_forms(way)) for way in WAYS]
     for name, scene in scenes.items():
-        bench = bench_of(scene, aobake.BakeSettings(), asked.points)
-        truth = bench.reference(REFERENCE_RAYS)
+        bench = bench_of(scene, aobake.BakeSettings(), points)
+        truth = bench.reference(reference)
         for way in WAYS:
             found = bench.estimates(replace(bench.settings, max_rays=1 << 14, **way))
             error = np.abs(found.mean.astype(np.float64) - truth)
             rows.append((name, way, (error, found.standard_error.astype(np.float64))))
-    print("| scene | bake | within 2 | within 4 | reported / true, rms |")
-    print("| --- | --- | --- | --- | --- |")
+    return rows
+
+
+def table_of(rows: list[Row]) -> Table:
+    """How many errors are within two and four of their bars, and how wide those are."""
+    cells = []
     for name, way, (error, bar) in rows:
         said = ", ".join(f"{key} {value}" for key, value in way.items())
-        wide = np.sqrt((bar**2).mean() / (error**2).mean())
-        print(
-            f"| {name} | {said} | {(error <= 2 * bar).mean():.1%} | {(error <= 4 * bar).mean():.2%} "
-            f"| {wide:.2f} |"
-        )
-    if asked.plot is not None:
-        draw(rows, asked.plot)
+        within = f"{(error <= 2 * bar).mean():.1%}", f"{(error <= 4 * bar).mean():.2%}"
+        cells.append([name, said, *within, float(np.sqrt((bar**2).mean() / (error**2).mean()))])
+    columns = ("scene", "bake", "within 2", "within 4", "reported / true, rms")
+    return Table("Honesty", columns, cells)
 
 
-def draw(rows: list[tuple[str, dict[str, object], Points]], path: Path) -> None:
+def generated() -> dict[str, aobake.Scene]:
+    """Two scans, the demo scene, and others with lines of all lengths."""
+    found = bodies()
+    return {
+        "scan, 20,000 faces": found["scan, 20,000 faces"],
+        "demo scene": found["demo hall"],
+        "scan, 2,000 faces": aobake.Scene.from_arrays(*scan(2000)),
+        "town of boxes": found["town of boxes"],
+        "terrain": found["terrain"],
+        "leaves": found["leaves"],
+        "twigs above ground": aobake.Scene.from_arrays(*twigs_above_ground()),
+    }
+
+
+def run(quick: bool) -> Iterator[Table]:
+    """The generated scenes."""
+    yield table_of(rows_of(generated(), *((200, 4096) if quick else (3000, REFERENCE_RAYS))))
+
+
+def draw(rows: list[Row], path: Path) -> None:
     """How many points lie within how many of their standard errors, for each scene."""
     from matplotlib.figure import Figure
 
@@ -100,6 +116,19 @@ def draw(rows: list[tuple[str, dict[str, object], Points]], path: Path) -> None:
     axes.set_ylabel("share of points")
     axes.legend(frameon=False)
     figure.savefig(path)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("meshes", nargs="*")
+    parser.add_argument("--points", type=int, default=3000)
+    parser.add_argument("--plot", type=Path)
+    asked = parser.parse_args()
+    scenes = {Path(name).stem: aobake.load(name) for name in asked.meshes} or generated()
+    rows = rows_of(scenes, asked.points, REFERENCE_RAYS)
+    print(table_of(rows).markdown())
+    if asked.plot is not None:
+        draw(rows, asked.plot)
 
 
 if __name__ == "__main__":

@@ -8,80 +8,84 @@ Prints Markdown: slopes, tolerances against fixed numbers of rays, and the overh
 from __future__ import annotations
 
 import argparse
-import statistics
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from bodies import bodies
 from numpy.typing import NDArray
+from tables import Spread, Table
 
 import aobake
 from aobake.study import Study, measure, needed, study_extent
 from aobake.study.bench import Bench, bench_of
 
 ROUNDS = 5
+REFERENCE_RAYS = 32_768
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--points", type=int, default=1500)
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--only")
-    asked = parser.parse_args()
+def tables(
+    chosen: dict[str, aobake.Scene], points: int, seeds: int, reference: int
+) -> Iterator[Table]:
+    """Slopes, errors, tolerances, and what rounds cost."""
     extent = replace(
         study_extent(quick=True),
-        points=asked.points,
-        seeds=asked.seeds,
-        reference=32_768,
+        points=points,
+        seeds=seeds,
+        reference=reference,
         sets=(16, 64, 256, 1024),
         methods=(),
         surface=0,
     )
-    chosen = {name: s for name, s in bodies().items() if asked.only in {None, name}}
     studies = {name: measure(s, aobake.BakeSettings(), extent) for name, s in chosen.items()}
-    slopes(studies)
-    budgets(studies)
-    tolerances(studies)
-    overhead(chosen, asked.points)
+    yield slopes(studies)
+    yield budgets(studies)
+    yield tolerances(studies)
+    yield overhead(chosen, points)
 
 
-def slopes(studies: dict[str, Study]) -> None:
+def slopes(studies: dict[str, Study]) -> Table:
     """How steeply the error of each set of directions falls."""
     names = [c.name for c in next(iter(studies.values())).curves if c.kind == "directions"]
-    print(f"\n| slope, 16 to 1,024 rays | {' | '.join(names)} |")
-    print(f"| --- |{' --- |' * len(names)}")
-    for name, study in studies.items():
-        found = {curve.name: curve.slope for curve in study.curves}
-        print(f"| {name} | {' | '.join(f'{found[n]:.2f}' for n in names)} |")
+    found = {name: {c.name: c.slope for c in study.curves} for name, study in studies.items()}
+    rows = [[name, *(of[n] for n in names)] for name, of in found.items()]
+    return Table("Slopes", ("from 16 to 1,024 rays", *names), rows)
 
 
-def budgets(studies: dict[str, Study]) -> None:
+def budgets(studies: dict[str, Study]) -> Table:
     """The error of fixed numbers of rays."""
     rays = [level.setting for level in next(iter(studies.values())).fixed.levels]
-    print(f"\n| RMSE | {' | '.join(rays)} |\n| --- |{' --- |' * len(rays)}")
-    for name, study in studies.items():
-        print(f"| {name} | {' | '.join(f'{v.rmse:.4f}' for v in study.fixed.levels)} |")
+    rows = [[name, *(v.rmse for v in study.fixed.levels)] for name, study in studies.items()]
+    return Table("RMSE of fixed numbers of rays", ("asset", *rays), rows)
 
 
-def tolerances(studies: dict[str, Study]) -> None:
+def tolerances(studies: dict[str, Study]) -> Table:
     """Rays towards a tolerance, and a fixed number for the same error."""
-    print("\n| asset | asked for | rays | RMSE | reported | within 2 | fixed rays for it | ratio |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    rows = []
     for name, study in studies.items():
         for curve in study.curves:
             for level in curve.levels if curve.kind == "tolerance" else ():
                 same = needed(study.fixed, level.rmse)
-                ratio = "" if same is None else f"{same[0]:.0f} | {level.rays / same[0]:.2f}"
-                print(
-                    f"| {name} | {level.setting} | {level.rays:.0f} | {level.rmse:.4f} "
-                    f"| {level.reported:.4f} | {level.within_2:.1%} | {ratio or ' | '} |"
-                )
+                fixed = [None, None] if same is None else [same[0], level.rays / same[0]]
+                told = [level.rmse, level.reported, f"{level.within_2:.1%}"]
+                rows.append([name, level.setting, level.rays, *told, *fixed])
+    columns = (
+        "asset",
+        "asked for",
+        "rays",
+        "RMSE",
+        "reported",
+        "within 2",
+        "fixed rays for it",
+        "ratio",
+    )
+    return Table("Tolerances", columns, rows)
 
 
-def overhead(scenes: dict[str, aobake.Scene], points: int) -> None:
+def overhead(scenes: dict[str, aobake.Scene], points: int) -> Table:
     """Processor time towards a tolerance over that of as many rays from each point in one pass, in turn."""
-    print("\n| asset | rounds / one pass, median (least to most) |\n| --- | --- |")
+    rows = []
     for name, scene in scenes.items():
         bench = bench_of(scene, aobake.BakeSettings(threads=1), 8 * points)
         found = []
@@ -91,7 +95,8 @@ def overhead(scenes: dict[str, aobake.Scene], points: int) -> None:
             traced = bench.estimates(towards).rays
             rounds = time.process_time() - start
             found.append(rounds / in_one_pass(bench, traced, seed))
-        print(f"| {name} | {statistics.median(found):.2f} ({min(found):.2f} to {max(found):.2f}) |")
+        rows.append([name, Spread.of(found)])
+    return Table("What rounds cost", ("asset", "rounds / one pass"), rows)
 
 
 def in_one_pass(bench: Bench, rays: NDArray[np.int32], seed: int) -> float:
@@ -104,6 +109,23 @@ def in_one_pass(bench: Bench, rays: NDArray[np.int32], seed: int) -> float:
         part.estimates(part.fixed(size, seed))
         spent += time.process_time() - start
     return spent
+
+
+def run(quick: bool) -> Iterator[Table]:
+    """Six bodies, or one."""
+    chosen = {"terrain": bodies()["terrain"]} if quick else bodies()
+    yield from tables(chosen, *((150, 2, 4096) if quick else (1500, 3, REFERENCE_RAYS)))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--points", type=int, default=1500)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--only")
+    asked = parser.parse_args()
+    chosen = {name: s for name, s in bodies().items() if asked.only in {None, name}}
+    for table in tables(chosen, asked.points, asked.seeds, REFERENCE_RAYS):
+        print(table.markdown(), flush=True)
 
 
 if __name__ == "__main__":

@@ -27,8 +27,8 @@ LAYERS = (
     ("atlas",),
     ("shading",),
     (
-        "plan", "planning", "bake", "bands", "bent_texels", "texel_samples", "texels", "pages", "lightmaps", "previews", "results", "environment", "study",
-        "report", "demo", "viewer", "__init__",
+        "plan", "planning", "bake", "bands", "bent_texels", "texel_samples", "texels", "pages", "lightmaps",
+        "previews", "results", "environment", "study", "report", "demo", "viewer", "__init__",
     ),
     ("flags", "patterns", "config_file", "config", "jobs"),
     ("batch",),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,12 @@ from aobake import (
     Mesh,
     Scene,
     SettingsError,
+    bake_texture,
     bake_vertices,
     plan,
     save,
 )
+from aobake.atlas.unwrap import Charts, unwrap
 from aobake.demo import hall
 from aobake.images import encode
 from aobake.meshes.scene import Attribute, Image, Texture
@@ -222,10 +224,41 @@ def test_an_estimate_knows_what_needs_no_ray() -> None:
     assert estimated(plan(scene, settings), scene, settings).rays == 0
 
 
-def test_an_estimate_of_nothing_is_nothing() -> None:
+@pytest.mark.parametrize("texture", [False, True])
+def test_an_estimate_of_nothing_is_nothing(texture: bool) -> None:
     empty = Scene.from_arrays(np.zeros((0, 3)), np.zeros((0, 3), int))
-    cost = estimated(plan(empty), empty)
+    decided = texture_plan(empty) if texture else plan(empty)
+    cost = estimated(decided, empty, texture=texture)
     assert (cost.points, cost.rays) == (0, 0)
+
+
+def test_an_estimate_of_a_texture_counts_its_pages_and_names_the_stages_of_the_bake() -> None:
+    shapes = [icosphere(2), box((2.0, 0.0, 0.0), (3.0, 1.0, 1.0))]
+    scene = Scene.from_meshes([Mesh(vertices=s.vertices, faces=s.faces) for s in shapes])
+    one = BakeSettings(rays=4, size=64, denoise="off")
+    several = replace(one, atlas="mesh", supersample=2, denoise="on")
+    costs = [estimated(texture_plan(scene, s), scene, s, texture=True) for s in (one, several)]
+    assert costs[1].points == pytest.approx(8 * costs[0].points, abs=8)
+    baked = bake_texture(scene, one)
+    assert set(costs[0].stages) == set(baked.seconds) - {"compile"}
+    assert set(costs[1].stages) == set(costs[0].stages) | {"denoise"}
+    assert costs[0].rays == pytest.approx(baked.rays, rel=0.5)
+    assert all(spent >= 0.0 for spent in costs[1].stages.values())
+
+
+def test_an_estimate_knows_what_need_not_be_unwrapped(monkeypatch: pytest.MonkeyPatch) -> None:
+    sheet = masked(np.ones((4, 4), np.float32))
+    asked: list[int] = []
+
+    def noting(meshes: Sequence[Mesh], settings: BakeSettings, threads: int | None) -> list[Charts]:
+        asked.append(len(meshes))
+        return unwrap(meshes, settings, threads)
+
+    monkeypatch.setattr("aobake.planning.texture_cost.unwrap", noting)
+    for uv, times in (("auto", 0), ("unwrap", 2)):
+        settings = BakeSettings(rays=1, size=32, uv=uv)
+        estimated(texture_plan(sheet, settings), sheet, settings, texture=True)
+        assert len(asked) == times
 
 
 @pytest.fixture

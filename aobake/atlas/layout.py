@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from aobake.meshes.scene import FloatArray, Scene
 from aobake.prepare import Prepared, name_of
 from aobake.settings import AtlasSettings
 
-__all__ = ["Layout", "Page", "lay_out"]
+__all__ = ["Intended", "Layout", "Page", "intended", "lay_out"]
 
 Progress = Callable[[int, int], None]
 SETS = 8  # TEXCOORD_n that are looked at
@@ -50,6 +50,32 @@ class Layout:
     placings: tuple[Placing | None, ...]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Intended:
+    """pages : how many there will be; unwrapped : the meshes that get new texture coordinates"""
+
+    pages: int
+    unwrapped: tuple[int, ...]
+
+
+def intended(scene: Scene, prepared: Prepared, settings: AtlasSettings) -> Intended:
+    """What lay_out will do, without doing it. Raises InputError where texture coordinates are missing or overlap."""
+    groups = _groups(scene, prepared, settings)
+    choices = [_choice(scene, group, settings) for group in groups]
+    return Intended(pages=len(groups), unwrapped=tuple(_loose(scene, groups, choices)))
+
+
+def _loose(scene: Scene, groups: Sequence[Sequence[int]], choices: Sequence[_Choice]) -> list[int]:
+    """The meshes of groups that keep no texture coordinates, each once."""
+    several = [
+        scene.instances[number].mesh
+        for group, choice in zip(groups, choices, strict=True)
+        if choice.uv_set is None
+        for number in group
+    ]
+    return list(dict.fromkeys(several))
+
+
 def lay_out(
     scene: Scene,
     prepared: Prepared,
@@ -65,13 +91,7 @@ def lay_out(
     """
     groups = _groups(scene, prepared, settings)
     choices = [_choice(scene, group, settings) for group in groups]
-    loose = [
-        number
-        for group, choice in zip(groups, choices, strict=True)
-        if choice.uv_set is None
-        for number in group
-    ]
-    charts = _charts(scene, loose, settings, threads, progress)
+    charts = _charts(scene, _loose(scene, groups, choices), settings, threads, progress)
     pages: list[Page] = []
     placings: dict[int, Placing] = {}
     for number, (group, choice) in enumerate(zip(groups, choices, strict=True)):
@@ -210,13 +230,12 @@ def _kept_page(
 
 def _charts(
     scene: Scene,
-    loose: Iterable[int],
+    meshes: Sequence[int],
     settings: AtlasSettings,
     threads: int | None,
     progress: Progress | None,
 ) -> dict[int, Charts]:
-    """mesh -> its charts, of every mesh that one of the instances stands for."""
-    meshes = list(dict.fromkeys(scene.instances[number].mesh for number in loose))
+    """mesh -> its charts."""
     found = unwrap([scene.meshes[mesh] for mesh in meshes], settings, threads, progress)
     return dict(zip(meshes, found, strict=True))
 

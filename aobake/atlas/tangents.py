@@ -50,7 +50,7 @@ def placed_tangents(
     linear : (3, 3) what is done to directions of the mesh
     """
     shares = np.stack([1.0 - weights.sum(axis=1), weights[:, 0], weights[:, 1]], axis=1)
-    tangents = np.einsum("tc,tcx->tx", shares, frames[faces])
+    tangents: FloatArray = np.einsum("tc,tcx->tx", shares, frames[faces])
     tangents[:, :3] = tangents[:, :3] @ linear.T
     if mirrors(linear):
         tangents[:, 3] *= -1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ from aobake.batch.places import Place, Stamp
 from aobake.batch.standing import UNSURE, Record, Role, from_here
 from aobake.batch.tasks import Outcome, Planned
 from aobake.batch.tree import Tree
+from aobake.errors import InputError
 
 __all__ = ["evidence"]
 
@@ -72,6 +74,8 @@ def _beside(planned: Planned, sides: Sequence[Record], target: Place) -> list[Re
         stamp = None if name is None else target.stamp(name)
         if name is None or stamp is None or stamp.size != side.stamp.size:
             continue
-        if target.digest(name) == side.sha256:
-            found.append(Record("side", name, stamp, side.sha256))
+        # Where it is gone by now, or cannot be read, it is not that file.
+        with contextlib.suppress(InputError):
+            if target.digest(name) == side.sha256:
+                found.append(Record("side", name, stamp, side.sha256))
     return found

@@ -16,7 +16,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from aobake.batch.discovery import plan_batch
-from aobake.batch.junit import write_junit
 from aobake.batch.leftovers import remove_leftovers
 from aobake.batch.lock import hold
 from aobake.batch.manifest import Manifest, Pruned
@@ -308,6 +307,8 @@ def _report(reports: Reports, facts: RunFacts, manifest: Manifest, run: int) -> 
     if reports.data is not None:
         write_json(reports.data, facts, manifest.entries(run))
     if reports.junit is not None:
+        from aobake.batch.junit import write_junit
+
         write_junit(reports.junit, facts, manifest.entries(run))
     if reports.page is not None:
         from aobake.batch.page import write_page

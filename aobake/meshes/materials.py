@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from aobake.meshes.arrays import FloatArray
@@ -51,6 +51,7 @@ class Material:
     base_color, emissive : linear; base_color_texture and emissive_texture are stored as sRGB and multiply
         them, and metallic_roughness_texture (roughness in G, metalness in B) multiplies its two
     normal_scale, occlusion_strength : as glTF defines them
+    extras : what applications have noted there, by their keys
     """
 
     name: str = ""
@@ -68,3 +69,4 @@ class Material:
     normal_scale: float = 1.0
     occlusion_texture: Texture | None = None
     occlusion_strength: float = 1.0
+    extras: Mapping[str, object] = field(default_factory=dict)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from aobake.meshes.coincident import first_equal_row
 from aobake.tracing.compiled import inlined, tight_kernel
+from aobake.tracing.rows import largest_in_rows
 from aobake.tracing.vectors import cross, dot, largest, length, minus, row, scaled
 
 __all__ = ["CREASE_DEGREES", "computed_normals", "unit_rows"]
@@ -26,7 +27,7 @@ CREASE_DEGREES = 40.0  # faces at a steeper angle do not share a normal where a 
 
 def unit_rows(vectors: FloatArray) -> FloatArray:
     """(N, 3) vectors at length 1; zeros where a vector is zero or not finite."""
-    largest = np.abs(vectors).max(axis=1, initial=0.0)
+    largest = largest_in_rows(vectors)
     usable = np.isfinite(largest) & (largest > 0.0)
     scaled = vectors / np.where(usable, largest, 1.0)[:, None]  # no overflow, no underflow
     scaled[~usable] = 0.0
@@ -63,7 +64,10 @@ def computed_normals(
 
 def _one_of_each_wall(faces: NDArray[np.uint32]) -> NDArray[np.bool_]:
     """(F,) False for a face that has the corners of an earlier one: its twin, or the back of its wall."""
-    first = first_equal_row(np.sort(faces, axis=1))
+    a, b, c = faces.T
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    middle = a ^ b ^ c ^ low ^ high  # what is left; sorting rows of three takes five times as long
+    first = first_equal_row(np.stack([low, middle, high], axis=1))
     return np.asarray(first == np.arange(len(first)), bool)
 
 
@@ -107,7 +111,11 @@ def _front_and_angles(vertices, faces, f):
 
 @tight_kernel
 def _add_own(vertices, faces, counts, sums):
-    """Add to sums (V, 3) the normals of the faces of each vertex, weighted by their angle there."""
+    """Add to sums (V, 3) the normals of the faces of each vertex, weighted by their angle there.
+
+    Dividing it over threads with the same sums takes a second kernel, which adds up in the order of faces, and
+    its compiling; of 1.3 s of a bake of 70,000 faces with 256 rays in two threads it could save 4 ms.
+    """
     for f in range(len(faces)):
         if counts[f]:
             front, angles = _front_and_angles(vertices, faces, f)

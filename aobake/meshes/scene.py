@@ -144,8 +144,9 @@ class Mesh:
     material : index into the scene's materials, or None
     attributes : what else is on the surface, under the names and with the meaning that glTF gives them:
         TEXCOORD_n (u, v; v runs down from an image's top edge), COLOR_n (3 or 4, linear), TANGENT (x, y, z,
-        and the bitangent's sign), _AO (1), _BENT_NORMAL (3, turned like normals). May read a value when it
-        is asked for, and then raise InputError
+        and the bitangent's sign), _AO (1), _BENT_NORMAL (3, turned like normals), _MEAN_DISTANCE (1). May read
+        a value when it is asked for, and then raise InputError
+    extras : what applications have noted there, by their keys
     """
 
     vertices: FloatArray
@@ -155,6 +156,7 @@ class Mesh:
     flat_shaded: bool = False
     material: int | None = None
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
+    extras: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         where = f"mesh {self.name!r}" if self.name else "mesh"
@@ -200,12 +202,14 @@ class Instance:
     transform : (4, 4) float64, from the mesh's space to the scene's, for column vectors
     stored_with : the instance, this one or an earlier one, with which it shares its place in the file, so
         that both can only be given the same values (EXT_mesh_gpu_instancing); None: it has its own
+    extras : what applications have noted there, by their keys
     """
 
     mesh: int
     transform: FloatArray = field(default_factory=lambda: np.eye(4))
     name: str = ""
     stored_with: int | None = None
+    extras: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "transform", placement(self.transform, "instance", self.name))

@@ -18,6 +18,7 @@ from aobake.meshes.orientation import consistent_winding
 from aobake.meshes.scene import Mesh
 from aobake.tracing.compiled import read_only, tight_kernel
 from aobake.tracing.conditioning import detail_at_vertices
+from aobake.tracing.rows import any_in_rows, finite_rows
 from aobake.tracing.vectors import cross, dot, largest, length, minus, row, scaled
 
 __all__ = ["Surface", "findings", "surface_of"]
@@ -56,7 +57,7 @@ def surface_of(mesh: Mesh, name: str = "") -> Surface:
     name : what findings call it
     """
     vertices = mesh.vertices
-    finite = np.asarray(np.isfinite(vertices).all(axis=1), bool)
+    finite = finite_rows(vertices)
     clean = read_only(vertices if finite.all() else np.where(finite[:, None], vertices, 0.0))
     given = read_only(mesh.faces.view(np.uint32))
     flat = faces_without_area(clean, given)
@@ -64,7 +65,7 @@ def surface_of(mesh: Mesh, name: str = "") -> Surface:
     usable = whole & ~flat
     faces = read_only(given if usable.all() else given[usable])
     faces, normals, found = _with_normals(mesh, clean, faces)
-    defined = normals.any(axis=1)
+    defined = any_in_rows(normals)
     used = np.zeros(len(vertices), bool)
     used[faces.reshape(-1)] = True
     asked = used & defined
@@ -111,7 +112,7 @@ def _with_normals(
     faces = _turned(faces, _against(vertices, faces, normals))
     lacking = np.zeros(len(vertices), bool)
     lacking[faces.reshape(-1)] = True
-    lacking &= ~normals.any(axis=1)
+    lacking &= ~any_in_rows(normals)
     if lacking.any():
         computed = computed_normals(vertices, faces, first_equal_row(vertices), crease)
         normals[lacking] = computed[lacking]

@@ -12,7 +12,7 @@ from aobake.meshes.scene import Scene
 from aobake.meshes.surfaces import surfaces_of
 from aobake.occlusion import compile_for, occlusion_at
 from aobake.open_sky import expected_share, hull_rays
-from aobake.plan import plan
+from aobake.plan import plan, texture_plan
 from aobake.planning.effect import Plan
 from aobake.points import SurfacePoints, vertex_points
 from aobake.prepare import Prepared, build, in_scene_units, lowest
@@ -27,8 +27,9 @@ FIRST_PROBE, LONGER = 64, 4  # points
 RUN = 16  # points next to each other that are probed together: neighbours meet the same triangles
 # Memory: a scan of 400,000 faces takes 270 bytes for each more than nothing does, half a vertex included.
 TRIANGLE_BYTES, VERTEX_BYTES = 160, 220
-# Of bent normals at a point: sums in float64, the result in float32. Of a face with holes: where it lies in them.
-BENT_BYTES, HOLED_BYTES = 36, 36
+# Of bent normals and of a distance at a point: sums in float64, the result in float32. Of a face with holes: where it
+# lies in them.
+BENT_BYTES, DISTANCE_BYTES, HOLED_BYTES = 36, 12, 36
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +43,7 @@ class EffectCost:
 
 @dataclass(frozen=True, kw_only=True)
 class Cost:
-    """What a bake will take, without reading, unwrapping and writing, once kernels are compiled.
+    """What a bake will take, without reading and writing, once kernels are compiled.
 
     seconds : in all; stages : stage -> seconds; points : vertices or texels; bytes : of memory
     effects : name -> what it costs, or would cost if it were on
@@ -61,19 +62,19 @@ def estimated(
     scene: Scene,
     settings: BakeSettings | None = None,
     *,
-    texels: int | None = None,
+    texture: bool = False,
 ) -> Cost:
     """Estimate what a plan costs on this machine, as it is now; takes about a second of tracing.
 
-    texels : how many are to be traced instead of the vertices; what becomes of them after is not estimated
+    texture : whether it is a plan of texture_plan: texels are traced instead of vertices
 
     Seconds of tracing are those of some points, in runs of neighbours all over the scene, times the others.
-    Raises EngineError where Embree cannot be used.
+    Raises EngineError where Embree cannot be used, and InputError where a texture's coordinates are at fault.
     """
     settings = in_scene_units(scene, settings or BakeSettings())
     seconds: dict[str, float] = {}
     with timed(seconds, "prepare"):
-        plan(scene, settings)
+        (texture_plan if texture else plan)(scene, settings)
         surfaces = surfaces_of(scene, settings)
     with timed(seconds, "build"):
         prepared = build(scene, surfaces, settings)
@@ -82,27 +83,44 @@ def estimated(
     compile_for(prepared, points, ground, settings)
     points = points.only(to_trace(points, first_alike(scene, settings, ground)))
     each, rays = _probed(prepared, points, ground, settings)
+    wanted = len(points)
+    if texture:
+        # Here, since it loads the unwrapper.
+        from aobake.planning.texture_cost import texture_cost
+
+        page = texture_cost(decided, scene, prepared, settings)
+        wanted = page.points
+        seconds |= page.stages
     method = decided.effects.get("method")
-    factor = method.cost if method is not None and method.on else 1.0
-    wanted = len(points) if texels is None else texels
-    traced, hull = wanted * factor, 0.0
-    if factor == 1.0:
-        share = expected_share(
-            prepared, prepared.placements, prepared.world.frame, points, wanted, ground, settings
-        )
-        traced *= 1.0 - share
-        hull = hull_rays(prepared, prepared.placements) if share > 0.0 else 0.0
+    if method is not None and method.on:
+        traced, hull = wanted * method.cost, 0
+    else:
+        share, hull = _open(prepared, points, wanted, ground, settings)
+        traced = wanted * (1.0 - share)
     seconds["trace"] = each * (traced + hull / max(rays, 1.0))
     size = TRIANGLE_BYTES * sum(len(part.faces) for part in prepared.parts)
     size += VERTEX_BYTES * max(scene.vertices, wanted)
     return Cost(
         seconds=sum(seconds.values()),
         stages=seconds,
-        points=scene.vertices if texels is None else texels,
+        points=wanted if texture else scene.vertices,
         rays=round(rays * traced),
         bytes=size,
         effects=_of_effects(decided, seconds["trace"], _extra_bytes(scene, decided, wanted)),
     )
+
+
+def _open(
+    prepared: Prepared,
+    points: SurfacePoints,
+    wanted: int,
+    ground: float | None,
+    settings: BakeSettings,
+) -> tuple[float, int]:
+    """(share of the points that need no ray, rays that could be traced while they are found)."""
+    everything, frame = prepared.placements, prepared.world.frame
+    share = expected_share(prepared, everything, frame, points, wanted, ground, settings)
+    return share, hull_rays(prepared, everything) if share > 0.0 else 0
 
 
 def _probed(
@@ -136,7 +154,8 @@ def _in_runs(count: int, wanted: int) -> np.ndarray[tuple[int], np.dtype[np.int6
 
 def _extra_bytes(scene: Scene, decided: Plan, points: int) -> dict[str, int]:
     """Memory that effects take beside what every bake takes; those that are not named take none."""
-    found = {"bent_normals": BENT_BYTES * max(scene.vertices, points)}
+    kept = max(scene.vertices, points)
+    found = {"bent_normals": BENT_BYTES * kept, "mean_distance": DISTANCE_BYTES * kept}
     if decided.effects["alpha"].on:
         from aobake.meshes.alpha import scene_alpha
 

@@ -1,4 +1,4 @@
-"""Effects of where rays go and how hits count: distribution, cone, distance, falloff, ground, bent normals."""
+"""Effects of where rays go, how hits count, and what else is kept of them."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ def direction_effects(settings: BakeSettings) -> Mapping[str, Effect]:
         "falloff": _falloff(settings),
         "ground": _ground(settings),
         "bent_normals": _bent_normals(settings),
+        "mean_distance": _mean_distance(settings),
     }
 
 
@@ -66,3 +67,10 @@ def _bent_normals(settings: BakeSettings) -> Effect:
     if not settings.bent_normals:
         return Effect(False, "Bent normals were not asked for.", BENT)
     return Effect(True, "The mean open direction is kept, from the same rays.", BENT)
+
+
+def _mean_distance(settings: BakeSettings) -> Effect:
+    cost = NEAREST if settings.falloff == "none" else 1.0
+    if not settings.mean_distance:
+        return Effect(False, "Mean distances were not asked for.", cost)
+    return Effect(True, "The mean distance of the nearest hits is kept, from the same rays.", cost)

@@ -36,8 +36,9 @@ def texture_effects(scene: Scene, settings: BakeSettings) -> Mapping[str, Effect
 def _method(scene: Scene, settings: BakeSettings) -> Effect:
     """On where values are fitted to samples inside the triangles."""
     cost = 3.0 * scene.triangles / max(1, scene.vertices)
-    if settings.method == "auto" and settings.bent_normals:
-        return Effect(False, "Bent normals are those of points.", cost)
+    if settings.method == "auto" and (settings.bent_normals or settings.mean_distance):
+        what = "Bent normals are" if settings.bent_normals else "Mean distances are"
+        return Effect(False, f"{what} found at points.", cost)
     if settings.method != "auto":
         return Effect(settings.method == "lsq", f"method is {settings.method}.", cost)
     from aobake.meshes.coarseness import typical_edge

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from aobake.settings import GroundAxis
 from aobake.tracing import embree
 from aobake.tracing.conditioning import UnitFrame
-from aobake.tracing.kernels import scratch, trace
+from aobake.tracing.kernels import SUMS, scratch, trace
 from aobake.tracing.sampling import direction_sets
 
 __all__ = ["Ground", "across", "ground_of", "openness"]
@@ -88,7 +88,7 @@ def _traced(tree: embree.Tree, points: FloatArray, axis: int, threads: int) -> F
 
     def rows(first: int) -> None:
         part = points[first : first + ROWS_AT_ONCE].reshape(-1, 3).astype(np.float32)
-        sums = np.empty((len(part), 3))
+        sums = np.empty((len(part), SUMS))
         trace(
             (functions.occluded8, functions.intersect8),
             tree.address,
@@ -104,6 +104,7 @@ def _traced(tree: embree.Tree, points: FloatArray, axis: int, threads: int) -> F
             None,
             scratch(),
             sums,
+            None,
             None,
         )
         result[first : first + ROWS_AT_ONCE] = (sums[:, 0] / sums[:, 2]).reshape(-1, count)

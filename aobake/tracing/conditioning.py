@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.tracing.compiled import read_only, tight_kernel
+from aobake.tracing.rows import bounds, largest_in_rows
 from aobake.tracing.vectors import length, minus, row
 
 if TYPE_CHECKING:
@@ -76,13 +77,7 @@ def unit_frame(parts: Sequence[FloatArray], center: FloatArray | None = None) ->
     if center is None:
         sampled = [part[:: max(1, len(part) // MOST_SAMPLED)] for part in filled]
         center = np.median(np.concatenate(sampled), axis=0)
-    reach = max(
-        max(
-            float(np.abs(part.max(axis=0) - center).max()),
-            float(np.abs(part.min(axis=0) - center).max()),
-        )
-        for part in filled
-    )
+    reach = max(float(np.abs(corner - center).max()) for part in filled for corner in bounds(part))
     if not (reach > 0.0 and math.isfinite(reach)):
         return UnitFrame(center, 1.0)
     exponent = math.frexp(reach)[1]
@@ -144,7 +139,7 @@ def regions(
 
 
 def _resolved(points: FloatArray, detail: FloatArray, center: FloatArray) -> NDArray[np.bool_]:
-    distance = np.abs(points - center).max(axis=1, initial=0.0)
+    distance = largest_in_rows(points - center)
     return np.asarray(detail >= RESOLVING_ULPS * 2.0**-23 * distance, bool)
 
 

@@ -1,8 +1,9 @@
 """Hits on what is not there: surfaces with holes cut by an alpha texture, or that let a share of light through.
 
 Embree's own traversal asks, for each hit on a face that has a hole, whether it counts. Where alpha is a
-share (glTF's BLEND) a hit counts with that probability. What it is drawn by depends on the ray and the
-triangle alone: no state is kept, and the order in which triangles are met does not matter.
+share (glTF's BLEND), and anything in the way closes a ray, the ray carries what is left of it: shares multiply
+in any order, so there is nothing random about it. Where the nearest hit is looked for, order does matter, and a
+hit counts with that probability. What it is drawn by depends on the ray and the triangle alone.
 """
 
 from __future__ import annotations
@@ -37,6 +38,9 @@ BLOCK = 8  # pixels; the bounds of a 512 x 512 image take 8 KiB and stay in the 
 U, V, PRIMITIVE, HIT_ROWS = 3, 4, 5, 8
 RAY_ROWS = 12
 CORNER_NUMBERS = 9  # of a face
+# What is left of a ray is a float32 in the place of its number, and none of it below this. Numbers, below 2^20, are
+# tiny floats there, and tell the filter to draw.
+LEAST_LEFT = 2.0**-16
 SHUFFLE = (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6)
 
 
@@ -120,34 +124,57 @@ def within(i, count, edge):
 
 
 @inlined
-def stops(data, arrays, face, u, v, limit):
-    """Whether the alpha of a face is at least `limit` at u and v, the weights of its second and third corner."""
-    corners, alpha, bounds = arrays
-    width, height, nearest = data[WIDTH], data[HEIGHT], data[NEAREST] != 0
+def place_of(data, corners, face, u, v):
+    """Column and row in the image, and the factor, at u and v, the weights of a face's second and third corner."""
     first, w = CORNER_NUMBERS * np.int64(face), np.float32(1.0) - u - v
     x = w * corners[first] + u * corners[first + 3] + v * corners[first + 6]
     y = w * corners[first + 1] + u * corners[first + 4] + v * corners[first + 7]
     factor = w * corners[first + 2] + u * corners[first + 5] + v * corners[first + 8]
-    limit *= 255.0
-    if nearest:
+    if data[NEAREST] != 0:
         x, y = x + np.float32(0.5), y + np.float32(0.5)
+    return x, y, factor
+
+
+@inlined
+def looked_up(data, alpha, x, y):
+    """The alpha of the image at a place, from 0 to 255."""
+    width, height = data[WIDTH], data[HEIGHT]
     left, upper = np.floor(x), np.floor(y)
     i = within(np.int64(left), width, data[EDGE_U])
     j = within(np.int64(upper), height, data[EDGE_V])
-    if 0 <= i < width and 0 <= j < height:
+    i0, j0 = wrapped(i, width, data[EDGE_U]), wrapped(j, height, data[EDGE_V]) * width
+    if data[NEAREST] != 0:
+        return float(alpha[j0 + i0])
+    i1, j1 = wrapped(i + 1, width, data[EDGE_U]), wrapped(j + 1, height, data[EDGE_V]) * width
+    right, down = x - left, y - upper
+    above = alpha[j0 + i0] * (1.0 - right) + alpha[j0 + i1] * right
+    below = alpha[j1 + i0] * (1.0 - right) + alpha[j1 + i1] * right
+    return above * (1.0 - down) + below * down
+
+
+@inlined
+def stops(data, arrays, face, u, v, limit):
+    """Whether the alpha of a face is at least `limit` at a place; told by its block alone where that is enough."""
+    corners, alpha, bounds = arrays
+    x, y, factor = place_of(data, corners, face, u, v)
+    limit *= 255.0
+    i = within(np.int64(np.floor(x)), data[WIDTH], data[EDGE_U])
+    j = within(np.int64(np.floor(y)), data[HEIGHT], data[EDGE_V])
+    if 0 <= i < data[WIDTH] and 0 <= j < data[HEIGHT]:
         block = 2 * ((j // BLOCK) * data[BLOCKS] + i // BLOCK)
         if factor * bounds[block] >= limit:
             return True
         if factor * bounds[block + 1] < limit:
             return False
-    i0, j0 = wrapped(i, width, data[EDGE_U]), wrapped(j, height, data[EDGE_V]) * width
-    if nearest:
-        return factor * alpha[j0 + i0] >= limit
-    i1, j1 = wrapped(i + 1, width, data[EDGE_U]), wrapped(j + 1, height, data[EDGE_V]) * width
-    right, down = x - left, y - upper
-    above = alpha[j0 + i0] * (1.0 - right) + alpha[j0 + i1] * right
-    below = alpha[j1 + i0] * (1.0 - right) + alpha[j1 + i1] * right
-    return factor * (above * (1.0 - down) + below * down) >= limit
+    return factor * looked_up(data, alpha, x, y) >= limit
+
+
+@inlined
+def share_stopped(data, arrays, face, u, v):
+    """The alpha of a face at a place, within [0, 1]."""
+    corners, alpha, _ = arrays
+    x, y, factor = place_of(data, corners, face, u, v)
+    return min(max(factor * looked_up(data, alpha, x, y) / 255.0, 0.0), 1.0)
 
 
 @inlined
@@ -202,7 +229,7 @@ def drawn(rays, hits, count, k):
 
 
 def _decide(arguments):
-    """RTCFilterFunctionN: make hits invalid where the triangle has a hole."""
+    """RTCFilterFunctionN: make hits invalid where the triangle has a hole, or lets some of the ray through."""
     fields = numba.carray(arguments, 6, np.int64)
     count = np.int64(numba.carray(arguments, 12, np.int32)[10])
     valid = numba.carray(pointer_to(fields[0]), count, np.int32)
@@ -222,7 +249,14 @@ def _decide(arguments):
         if data[ONE_SIDED] != 0 and from_behind(ray, hit, count, k):
             valid[k] = 0
             continue
-        limit = cutoff if cutoff >= 0.0 else drawn(rays, hits, count, k)
         face, u, v = hits[PRIMITIVE * count + k], hit[U * count + k], hit[V * count + k]
+        left = ray[RAY_NUMBER * count + k]
+        if cutoff < 0.0 and left >= LEAST_LEFT:
+            left *= 1.0 - share_stopped(data, (corners, alpha, bounds), face, u, v)
+            if left >= LEAST_LEFT:
+                ray[RAY_NUMBER * count + k] = left
+                valid[k] = 0
+            continue
+        limit = cutoff if cutoff >= 0.0 else drawn(rays, hits, count, k)
         if not stops(data, (corners, alpha, bounds), face, u, v, limit):
             valid[k] = 0

@@ -122,6 +122,8 @@ def build_tree(
     bodies : geometry i of the scene is bodies[i]
     instances : (index into placed, (3, 4) float32 transform); geometry len(bodies) + k is instance k
     The tree is the robust one: closed meshes leak no ray at edges. Raises EngineError.
+    Tried: building it in a thread beside the normals. Embree builds in all threads already (39 ms of processors
+    for 70,000 triangles, 20 of them in the calling thread), and both together took as long as one after the other.
     """
     library, device = _library(), _device()
     scene = _new_scene()

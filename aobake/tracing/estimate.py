@@ -19,9 +19,11 @@ from numpy.typing import NDArray
 from aobake.settings import FIRST_ROUND, TraceSettings
 from aobake.tracing import embree
 from aobake.tracing.contacts import note_triangle
-from aobake.tracing.kernels import LINEAR, SMOOTH, trace
+from aobake.tracing.gathered import Gathered
+from aobake.tracing.kernels import LINEAR, SMOOTH, SUMS, trace
 from aobake.tracing.kernels import scratch as kernel_scratch
 from aobake.tracing.lobes import lobed
+from aobake.tracing.order import along, path
 from aobake.tracing.origins import ENCLOSED, OPEN, PLAIN, place_origins
 from aobake.tracing.origins import scratch as origins_scratch
 from aobake.tracing.rounds import Tally, grown
@@ -52,6 +54,7 @@ class Request:
         face to face; None: nothing is known of any
     sets : directions to trace instead of sampling.direction_sets(rays), as many and in the same form, but
         2^k sets of any number: for comparing ways to choose them; None: those
+    reach : how far a ray counts at most in a mean distance, in scene units; None: nobody asks for one
     """
 
     positions: FloatArray
@@ -61,6 +64,7 @@ class Request:
     ground: float | None = None
     open: NDArray[np.bool_] | None = None
     sets: NDArray[np.float32] | None = None
+    reach: float | None = None
 
     def only(self, chosen: IntArray) -> Request:
         """Some of the points, by their place in these arrays."""
@@ -79,6 +83,7 @@ class Estimates:
     """mean, standard_error : (P,) float32; rays : (P,) int32; states : (P,) uint8 of origins.py.
 
     bent : (P, 3) float32, unit length, the mean open direction, the normal where nothing is open; or None
+    distance : (P,) float32, how far rays get in the mean, in scene units; or None
     """
 
     mean: NDArray[np.float32]
@@ -86,16 +91,18 @@ class Estimates:
     rays: NDArray[np.int32]
     states: NDArray[np.uint8]
     bent: NDArray[np.float32] | None = None
+    distance: NDArray[np.float32] | None = None
 
     @classmethod
-    def blank(cls, count: int, *, bent: bool = False) -> Estimates:
-        """For `count` points, all open and nothing spent yet."""
+    def blank(cls, count: int, *, bent: bool = False, reach: float | None = None) -> Estimates:
+        """For `count` points, all open and nothing spent yet. reach : of their distances, if there are any"""
         return cls(
             mean=np.ones(count, np.float32),
             standard_error=np.zeros(count, np.float32),
             rays=np.zeros(count, np.int32),
             states=np.zeros(count, np.uint8),
             bent=np.zeros((count, 3), np.float32) if bent else None,
+            distance=None if reach is None else np.full(count, reach, np.float32),
         )
 
     def only(self, chosen: IntArray) -> Estimates:
@@ -106,6 +113,7 @@ class Estimates:
             rays=self.rays[chosen],
             states=self.states[chosen],
             bent=None if self.bent is None else self.bent[chosen],
+            distance=None if self.distance is None else self.distance[chosen],
         )
 
     def put(self, chosen: IntArray, part: Estimates) -> None:
@@ -114,6 +122,8 @@ class Estimates:
         self.rays[chosen], self.states[chosen] = part.rays, part.states
         if self.bent is not None and part.bent is not None:
             self.bent[chosen] = part.bent
+        if self.distance is not None and part.distance is not None:
+            self.distance[chosen] = part.distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +131,7 @@ class Work:
     """What there is to trace, and what has come of it so far.
 
     origins : (P, 3) float32, in the tree's space
-    open_directions : (P, 3) float64, the sum of the directions of rays, each as much as it is open; or None
+    order : (P,) the order that points are traced in; None: as they stand
     """
 
     world: World
@@ -130,7 +140,8 @@ class Work:
     origins: NDArray[np.float32]
     states: NDArray[np.uint8]
     tally: Tally
-    open_directions: FloatArray | None
+    gathered: Gathered
+    order: IntArray | None
 
     @classmethod
     def planned(cls, world: World, request: Request, settings: TraceSettings) -> Work:
@@ -138,6 +149,7 @@ class Work:
         count = len(request.positions)
         origins = np.empty((count, 3), np.float32)
         states = np.zeros(count, np.uint8)
+        reach = None if request.reach is None else request.reach * world.frame.scale
         return cls(
             world,
             request,
@@ -145,19 +157,21 @@ class Work:
             origins,
             states,
             Tally.blank(count, grows=settings.tolerance is not None),
-            np.zeros((count, 3)) if settings.bent_normals else None,
+            Gathered.blank(count, bent=settings.bent_normals, reach=reach),
+            path(request.positions),
         )
 
 
 def compile_kernels(world: World, request: Request, settings: TraceSettings) -> None:
     """Compile what these settings need, or load it from disk, in the calling thread.
 
-    There an interrupt ends it; threads that compile at once would wait for each other.
+    There an interrupt ends it; threads that compile at once would wait for each other. The kernel that
+    finds origins comes last: another process may be compiling it (ahead.py).
     """
-    nothing = Work.planned(world, request, settings)
     none = np.zeros(0, np.int64)
-    _place(nothing, none)
+    nothing = Work.planned(world, request.only(none), settings)
     _trace(nothing, none, direction_sets(1), 1)
+    _place(nothing, none)
 
 
 def estimate(
@@ -198,7 +212,7 @@ def _first_pass(work: Work, over_blocks: Callable[..., None], progress: Progress
     report = None
     if progress is not None:
         report = (lambda done: progress(done, count)) if fixed else (lambda _: progress(0, count))
-    over_blocks(begin, np.arange(count), rays, report)
+    over_blocks(begin, along(work.order, np.arange(count)), rays, report)
 
 
 def _rounds(work: Work, over_blocks: Callable[..., None], progress: Progress | None) -> None:
@@ -220,7 +234,7 @@ def _rounds(work: Work, over_blocks: Callable[..., None], progress: Progress | N
             size, goal = divmod(step, STEP)
             added = lobed(added_directions(size, goal), settings.distribution, settings.spread)
             grow = partial(_trace, work, sets=added, rays=goal - size)
-            over_blocks(grow, seen[growing[steps == step]], goal - size, report)
+            over_blocks(grow, along(work.order, seen[growing[steps == step]]), goal - size, report)
 
 
 def _still(progress: Progress, settled: int, count: int, _: int) -> None:
@@ -307,8 +321,8 @@ def _trace(work: Work, chosen: IntArray, sets: NDArray[np.float32], rays: int) -
     """Trace the same number of rays from each of the chosen points, and add them to the tally."""
     functions, settings, request = embree.functions(), work.settings, work.request
     at, scale = work.origins[chosen], work.world.frame.scale
-    sums = np.empty((len(chosen), 3))
-    directions = None if work.open_directions is None else np.zeros((len(chosen), 3))
+    sums = np.empty((len(chosen), SUMS))
+    gathered = work.gathered.part(len(chosen))
     geometric = None
     if request.geometric is not None:
         geometric = request.geometric[chosen].astype(np.float32)
@@ -329,11 +343,10 @@ def _trace(work: Work, chosen: IntArray, sets: NDArray[np.float32], rays: int) -
         falloff,
         kernel_scratch(),
         sums,
-        directions,
+        *gathered.for_kernel(),
     )
     work.tally.add(chosen, sums, rays)
-    if work.open_directions is not None and directions is not None:
-        work.open_directions[chosen] += directions
+    work.gathered.add(chosen, gathered)
 
 
 def _ground(work: Work, at: NDArray[np.float32]) -> tuple[int, NDArray[np.float32]] | None:
@@ -349,23 +362,18 @@ def _ground(work: Work, at: NDArray[np.float32]) -> tuple[int, NDArray[np.float3
 def _estimates(work: Work) -> Estimates:
     """Means and errors of what was counted; 0 without an error where a point is enclosed, 1 where it is open."""
     mean, error = work.tally.mean(), work.tally.standard_error()
-    mean[work.states == ENCLOSED] = 0.0
-    error[work.states == ENCLOSED] = 0.0
+    enclosed = work.states == ENCLOSED
+    mean[enclosed] = 0.0
+    error[enclosed] = 0.0
+    distance = work.gathered.mean_distance(work.tally.counted)
+    if distance is not None:
+        distance[enclosed] = 0.0
+        distance /= work.world.frame.scale
     return Estimates(
         mean=mean.astype(np.float32),
         standard_error=error.astype(np.float32),
         rays=work.tally.counted.astype(np.int32),
         states=work.states,
-        bent=None if work.open_directions is None else _bent(work, work.open_directions),
+        bent=work.gathered.bent(_wants_rays(work.states), work.request.normals),
+        distance=None if distance is None else distance.astype(np.float32),
     )
-
-
-def _bent(work: Work, directions: FloatArray) -> NDArray[np.float32]:
-    """(P, 3) the mean open directions at unit length; the normals where nothing was open, or nothing traced.
-
-    Source: H. Landis, Production-ready global illumination, SIGGRAPH course notes 16, 2002.
-    """
-    length = np.linalg.norm(directions, axis=1, keepdims=True)
-    told = (length > 0.0) & _wants_rays(work.states)[:, None]
-    mean = directions / np.where(told, length, 1.0)
-    return np.where(told, mean, work.request.normals).astype(np.float32)

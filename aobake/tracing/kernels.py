@@ -2,11 +2,12 @@
 
 A point's rays go out in packets of eight neighbouring directions, made here, traced by Embree and
 counted at once; they never exist in memory together. A feature that is off (a ground, a limit by the
-geometric normal, a sum of open directions) is passed as None, for which numba compiles a kernel without it.
+geometric normal, sums of open directions or of distances) is passed as None, for which numba compiles a kernel
+without it.
 
 The error estimate comes from the same pass: along a Hilbert curve over the hemisphere the squared
-differences of successive values add up to a measure of how long the boundary of the visible region is
-(see estimate.py).
+differences of successive values add up to a measure of how long the boundary of the visible region is, and
+those within packets, which lie farther apart, tell whether it is a line at all (see rounds.py).
 
 Approaches tried: one ray at a time (0.7 of the rate); directions scrambled per ray (0.5); a list of
 made-up rays for a whole block, traced in a second pass (0.9, and 48 bytes a ray).
@@ -23,9 +24,10 @@ from numpy.typing import NDArray
 
 from aobake.tracing.compiled import aligned, inlined, tight_kernel
 
-__all__ = ["LINEAR", "SMOOTH", "scratch", "trace"]
+__all__ = ["LINEAR", "SMOOTH", "SUMS", "scratch", "trace"]
 
 LINEAR, SMOOTH = 0, 1
+SUMS = 5  # columns of what trace adds up
 
 # Rows of RTCRay8 and RTCHit8, eight 32-bit values each.
 ORIGIN, NEAR, DIRECTION, TIME, FAR, MASK, RAY_NUMBER, FLAGS = 0, 3, 4, 7, 8, 9, 10, 11
@@ -130,17 +132,27 @@ def choose(counts, rays, lanes, geometric):
 
 
 @inlined
-def stop_at_ground(valid, rays, ground, point, falloff):
+def stop_at_ground(valid, rays, ground, point, falloff, distances):
     """End the sinking rays at the ground: at once where any hit settles them, else at its distance."""
     axis, heights = ground
     for k in range(8):
         sinking = -rays[8 * (DIRECTION + axis) + k]
         if sinking > 0.0 and heights[point] <= sinking * rays[8 * FAR + k]:
-            if falloff is None:
+            if falloff is None and distances is None:
                 rays[8 * FAR + k] = -np.inf
                 valid[k] = 0
             else:
                 rays[8 * FAR + k] = heights[point] / sinking
+
+
+@inlined
+def tell_filters(rays, words, number, falloff, distances):
+    """Note what filters of surfaces that stop a share need: how much of a ray is left, or by what to draw."""
+    for k in range(8):
+        if falloff is None and distances is None:
+            rays[8 * RAY_NUMBER + k] = 1.0
+        else:
+            words[8 * RAY_NUMBER + k] = 8 * number + k
 
 
 @inlined
@@ -152,19 +164,25 @@ def forget_hits(words):
 
 
 @inlined
-def openness(reached, far, falloff):
-    """How open a ray counts that got as far as `reached`: 1 for one that met nothing."""
+def openness(rays, k, far, falloff, distances):
+    """How open ray k counts: as much as is left of it where it met nothing, 1 if no surface stops a share."""
+    reached = rays[8 * FAR + k]
     if falloff is None:
-        return 1.0 if reached >= 0.0 else 0.0
+        if distances is None:
+            return float(rays[8 * RAY_NUMBER + k]) if reached >= far else 0.0
+        return 1.0 if reached >= far else 0.0
     u = min(max(reached / far, 0.0), 1.0)
     return u if falloff == LINEAR else u * u * (3.0 - 2.0 * u)
 
 
 @inlined
-def add_direction(sums, point, rays, k, value):
-    """Add the direction of ray k, as much as it is open."""
-    for i in range(3):
-        sums[point, i] += value * rays[8 * (DIRECTION + i) + k]
+def gather(open_directions, distances, point, rays, k, value):
+    """Add the direction of ray k, as much as it is open, and how far it got, but no farther than counts."""
+    if open_directions is not None:
+        for i in range(3):
+            open_directions[point, i] += value * rays[8 * (DIRECTION + i) + k]
+    if distances is not None:
+        distances[1][point] += min(rays[8 * FAR + k], distances[0])
 
 
 def scratch() -> tuple[
@@ -192,6 +210,7 @@ def trace(
     scratch,
     out,
     open_directions,
+    distances,
 ):
     """Trace `rays` directions from each point and add up how open they are.
 
@@ -205,19 +224,23 @@ def trace(
     ground : (axis, (P,) float32 heights of the origins above it), or None
     falloff : LINEAR or SMOOTH, for which the nearest hit is looked for; None: any hit closes a ray
     scratch : of scratch()
-    out : (P, 3) float64: sum of openness, sum of squared successive differences, rays counted
+    out : (P, 5) float64: sum of openness, sum of squared successive differences, rays counted; of the packets
+        whose rays all count the sum of squared differences of every two of them, and how many they are
     open_directions : (P, 3) float64, to which directions are added, each as much as it is open; or None
+    distances : (how far a ray counts at most, (P,) float64 to which it is added how far they got), for which the
+        nearest hit is looked for; or None
     """
     packet, words, masks, frame = scratch
     valid, counts = masks[:8], masks[8:16]
     ready(packet, words)
-    call = functions[0] if falloff is None else functions[1]
+    call = functions[0] if falloff is None and distances is None else functions[1]
     for point in range(len(origins)):
         bits = mix(seed, numbers[point])
         turned_frame(normals[point], bits, frame)
         set_out(packet, origins[point])
         chosen = sets[np.int64(bits & np.uint64(len(sets) - 1))]
         total, rough, counted = 0.0, 0.0, 0
+        apart, whole = 0.0, 0
         before = -1.0
         for number in range(len(chosen)):
             aim(packet, chosen[number], frame, far)
@@ -226,20 +249,27 @@ def trace(
             )
             for k in range(8):
                 valid[k] = counts[k]
-                words[8 * RAY_NUMBER + k] = 8 * number + k  # for filters that draw by it
+            tell_filters(packet, words, number, falloff, distances)
             if ground is not None:
-                stop_at_ground(valid, packet, ground, point, falloff)
-            if falloff is not None:
+                stop_at_ground(valid, packet, ground, point, falloff, distances)
+            if falloff is not None or distances is not None:
                 forget_hits(words)
             call_packet(call, masks.ctypes.data, scene, packet.ctypes.data)
+            lanes, inside, squares = 0, 0.0, 0.0
             for k in range(8):
                 if counts[k] != 0:
-                    value = openness(packet[8 * FAR + k], far, falloff)
+                    value = openness(packet, k, far, falloff, distances)
                     total += value
-                    counted += 1
-                    if open_directions is not None:
-                        add_direction(open_directions, point, packet, k, value)
+                    lanes += 1
+                    inside += value
+                    squares += value * value
+                    gather(open_directions, distances, point, packet, k, value)
                     if before >= 0.0:
                         rough += (value - before) * (value - before)
                     before = value
+            counted += lanes
+            if lanes == 8:
+                apart += 8.0 * squares - inside * inside
+                whole += 1
         out[point, 0], out[point, 1], out[point, 2] = total, rough, counted
+        out[point, 3], out[point, 4] = apart, whole

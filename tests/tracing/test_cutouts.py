@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -95,28 +96,62 @@ def test_a_blended_sheet_takes_its_share(alpha: float) -> None:
     assert abs(seen(plain, rays=4096) - (1.0 - alpha * SQUARE)) < 3e-3
 
 
-def test_sheets_behind_each_other_take_their_shares_one_after_the_other() -> None:
-    """A = product of 1 - alpha; two triangles of a wide sheet and three sheets draw independently."""
-    shares = (0.3, 0.5, 0.7)
-    scene = scene_of(
-        [sheet(1e4, 1.0 + 0.1 * k, material=k) for k in range(3)],
-        [Material(alpha_mode="BLEND", base_color=(1.0, 1.0, 1.0, a)) for a in shares],
-    )
+def spread_out(scene: Scene, settings: BakeSettings, sky: float) -> tuple[FloatArray, FloatArray]:
+    """How far off 400 points under wide sheets are, each with directions of its own, and what they say of it."""
     points = np.random.default_rng(5).uniform(-1.0, 1.0, (400, 3)) * (1.0, 1.0, 0.0)
-    found = visibility(scene, points, np.tile(UP, (400, 1)), BakeSettings(rays=1024))
-    error = found.mean - np.prod(1.0 - np.array(shares))
-    assert abs(error.mean()) < 2e-3
-    assert np.sqrt((error**2).mean()) < 0.0096  # of independent draws
-    assert (np.abs(error) <= 4.0 * found.standard_error).mean() > 0.95
+    found = visibility(scene, points, np.tile(UP, (400, 1)), settings)
+    return found.mean.astype(np.float64) - sky, found.standard_error.astype(np.float64)
+
+
+def blended(shares: Sequence[float], half: float = 1e4) -> Scene:
+    return scene_of(
+        [sheet(half, 1.0 + 0.1 * k, material=k) for k in range(len(shares))],
+        [Material(alpha_mode="BLEND", base_color=(1.0, 1.0, 1.0, share)) for share in shares],
+    )
+
+
+@pytest.mark.parametrize("shares", [(0.5,), (0.3, 0.5, 0.7), (0.5,) * 6])
+def test_sheets_behind_each_other_take_their_shares_without_noise(shares: Sequence[float]) -> None:
+    """A = product of 1 - alpha at every point. A ray along an edge of two triangles may meet both."""
+    sky = float(np.prod(1.0 - np.array(shares)))
+    wrong, error = spread_out(blended(shares), BakeSettings(rays=256), sky)
+    by_chance = np.sqrt(sky * (1.0 - sky) / 256)
+    assert np.sqrt((wrong**2).mean()) < 0.04 * by_chance
+    assert (np.abs(wrong) <= 2.0 * error).all()
+    solid = scene_of([sheet(1e4, 1.0)], [Material()])
+    opaque = spread_out(solid, BakeSettings(rays=256), 0.0)[1]
+    assert error.max() < 1.5 * opaque.max(), "hardly more than under a sheet that stops all"
+
+
+@pytest.mark.parametrize("share", [0.6, 0.9])
+def test_the_error_beside_a_blended_edge_is_honest(share: float) -> None:
+    """A = 1 - alpha F of a square that takes a part of the sky; errors come from its outline alone."""
+    scene = blended((share,), half=1.0)
+    places = np.zeros((400, 3)), np.tile(UP, (400, 1))
+    found = visibility(scene, *places, BakeSettings(rays=256))
+    wrong = found.mean - (1.0 - share * 4.0 * rectangle_factor(1.0, 1.0, 1.0))
+    assert (np.abs(wrong) <= 2.0 * found.standard_error).mean() >= 0.93
+    rms = float(np.sqrt((wrong**2).mean()))
+    assert np.sqrt((found.standard_error**2).mean()) < 2.0 * rms
+
+
+FADING = BakeSettings(rays=256, max_distance=1e9, falloff="linear")  # asks for the nearest hits
+
+
+def test_where_the_nearest_hit_counts_sheets_are_drawn_independently() -> None:
+    """Two triangles of a wide sheet, and three sheets."""
+    shares = (0.3, 0.5, 0.7)
+    sky = float(np.prod(1.0 - np.array(shares)))
+    wrong, _ = spread_out(blended(shares), replace(FADING, rays=1024), sky)
+    assert abs(wrong.mean()) < 2e-3
+    assert np.sqrt((wrong**2).mean()) < 0.0096  # of independent draws
 
 
 def test_a_share_is_drawn_more_evenly_than_by_chance() -> None:
-    scene = overhead(None, half=1e4, alpha_mode="BLEND", base_color=(1.0, 1.0, 1.0, 0.5))
-    points = np.random.default_rng(5).uniform(-1.0, 1.0, (400, 3)) * (1.0, 1.0, 0.0)
-    found = visibility(scene, points, np.tile(UP, (400, 1)), BakeSettings(rays=256))
-    rms = float(np.sqrt(((found.mean - 0.5) ** 2).mean()))
+    wrong, error = spread_out(blended((0.5,)), FADING, 0.5)
+    rms = float(np.sqrt((wrong**2).mean()))
     assert rms < 0.25 * np.sqrt(0.25 / 256)
-    assert rms < float(np.sqrt((found.standard_error**2).mean())) < 5.0 * rms
+    assert rms < float(np.sqrt((error**2).mean())) < 5.0 * rms
 
 
 @pytest.mark.parametrize("falloff", ["linear", "smooth"])

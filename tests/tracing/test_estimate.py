@@ -213,6 +213,32 @@ def test_error_bars_are_honest_where_the_truth_is_known(how: dict[str, Any]) -> 
     assert np.sqrt((bar**2).mean()) <= 1.5 * np.sqrt((error**2).mean())
 
 
+def leaves(count: int) -> Triangles:
+    """Small squares that lie anyhow in a ball: all edges and no surface."""
+    rng = np.random.default_rng(2)
+    middle = rng.standard_normal((count, 1, 3))
+    middle *= rng.random((count, 1, 1)) ** (1 / 3) / np.linalg.norm(middle, axis=2, keepdims=True)
+    u, v, _ = 0.05 * np.linalg.qr(rng.standard_normal((count, 3, 3))).Q.transpose(2, 0, 1)
+    around = np.stack([-u - v, u - v, u + v, v - u], axis=1)
+    first = 4 * np.arange(count)[:, None, None]
+    faces = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    return Triangles((middle + around).reshape(-1, 3), faces.astype(np.int32))
+
+
+def test_error_bars_are_honest_among_leaves() -> None:
+    """Where edges are everywhere rays err nearly independently, which bars for lines do not see."""
+    scene = Scene.from_arrays(*leaves(3000))
+    rng = np.random.default_rng(3)
+    at, around = rng.uniform(-0.5, 0.5, (500, 3)), rng.standard_normal((500, 3))
+    rough, exact = (
+        visibility(scene, at, around, BakeSettings(rays=rays, seed=rays)) for rays in (256, 4096)
+    )
+    error, bar = np.abs(rough.mean.astype(np.float64) - exact.mean), rough.standard_error
+    assert (error <= 2.0 * bar).mean() >= 0.91
+    assert (error <= 4.0 * bar).mean() >= 0.985
+    assert 0.9 <= float(np.sqrt((bar**2).mean() / (error**2).mean())) <= 1.5
+
+
 def test_rays_saved_are_counted_against_the_same_error() -> None:
     """Sets that grow are a little worse, so equal points save less than nothing; unequal ones save."""
     error, rays = np.full(8, 0.01, np.float32), np.full(8, 200, np.int32)

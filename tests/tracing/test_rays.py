@@ -8,9 +8,20 @@ from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 
 from aobake import BakeSettings, Scene, visibility
-from aobake.tracing.kernels import mix, turned_frame
+from aobake.tracing import embree
+from aobake.tracing.compiled import tight_kernel
+from aobake.tracing.kernels import SUMS, mix, scratch, trace, turned_frame
+from aobake.tracing.sampling import direction_sets
 from tests.scenes import Triangles, box, icosphere, joined, moved, patch, rotation, unit
-from tests.tracing.rays import brute_force, directions_of, mixed_bits, occluded, placed, world_of
+from tests.tracing.rays import (
+    brute_force,
+    directions_of,
+    mixed_bits,
+    occluded,
+    placed,
+    sums_of,
+    world_of,
+)
 
 
 def clutter(seed: int, faces: int = 60) -> Triangles:
@@ -103,10 +114,43 @@ def test_the_kernel_counts_what_the_scene_class_of_embreex_counts() -> None:
     assert differences.max() <= 2
 
 
+@pytest.mark.parametrize("rays", [5, 64, 100])
+def test_the_kernel_adds_up_what_its_rays_tell(rays: int) -> None:
+    """As many rays one by one; only those at edges may differ, which changes sums of few points."""
+    world, rng = world_of(clutter(4, 300)), np.random.default_rng(8)
+    origins = rng.uniform(-0.5, 0.5, (200, 3)).astype(np.float32)
+    normals = rng.standard_normal((200, 3)).astype(np.float32)
+    functions, sums = embree.functions(), np.empty((200, SUMS))
+    trace(
+        (functions.occluded8, functions.intersect8),
+        world.tree.address,
+        origins,
+        normals,
+        None,
+        np.arange(200),
+        np.uint64(0),
+        direction_sets(rays),
+        rays,
+        np.float32(np.inf),
+        None,
+        None,
+        scratch(),
+        sums,
+        None,
+        None,
+    )
+    around = [directions_of(0, number, normal, rays) for number, normal in enumerate(normals)]
+    directions = np.concatenate(around).astype(np.float32)
+    hits = occluded(world.tree, np.repeat(origins, rays, axis=0), directions)
+    expected = sums_of(1.0 - hits.reshape(200, rays).astype(np.float64))
+    assert (np.abs(sums - expected) < 1e-9).all(axis=1).mean() > 0.95
+
+
 @pytest.mark.parametrize("seed", [0, 1, 2**63, 2**64 - 1])
 def test_bits_are_mixed_as_in_whole_numbers(seed: int) -> None:
+    compiled = tight_kernel(mix)
     for index in (0, 1, 2**31, 10**12):
-        assert int(mix(np.uint64(seed), np.int64(index))) == mixed_bits(seed, index)
+        assert int(compiled(np.uint64(seed), np.int64(index))) == mixed_bits(seed, index)
 
 
 @pytest.mark.parametrize(
@@ -124,7 +168,7 @@ def test_bits_are_mixed_as_in_whole_numbers(seed: int) -> None:
 )
 def test_a_frame_is_orthonormal_and_right_handed(normal: tuple[float, float, float]) -> None:
     frame = np.empty((3, 3))
-    turned_frame(np.array(normal, np.float64), np.uint64(mixed_bits(3, 4)), frame)
+    tight_kernel(turned_frame)(np.array(normal, np.float64), np.uint64(mixed_bits(3, 4)), frame)
     assert np.allclose(frame @ frame.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(frame) > 0.0
     assert np.allclose(frame[2], unit(normal), atol=1e-15)

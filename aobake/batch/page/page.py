@@ -19,7 +19,7 @@ from aobake.files import write_files
 
 __all__ = ["MOST_EMBEDDED", "write_page"]
 
-MOST_EMBEDDED = 24 << 20  # bytes of pictures within the page; those of about 2,500 assets
+MOST_EMBEDDED = 24 << 20  # bytes of pictures within the page; those of 3,000 assets and more
 
 
 def write_page(

@@ -8,7 +8,7 @@ pays for trimesh.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, cast
@@ -20,7 +20,7 @@ from aobake.errors import InputError, OutputError, nearest
 from aobake.meshes.formats.sniff import refuse_wrong_name
 from aobake.meshes.lightmap import Lightmap
 from aobake.meshes.scene import Scene
-from aobake.settings import ImageSettings, StoreSettings
+from aobake.settings import Further, ImageSettings, StoreSettings
 
 __all__ = [
     "IMAGES",
@@ -67,8 +67,8 @@ class Writer(Protocol):
         """
 
 
-class BentNormalWriter(Protocol):
-    """What a format module offers when it can hold bent normals as well."""
+class FurtherWriter(Protocol):
+    """What a format module offers when it can hold more than ambient occlusion."""
 
     def write(
         self,
@@ -76,9 +76,9 @@ class BentNormalWriter(Protocol):
         ao: Sequence[NDArray[np.float32]],
         target: Path,
         store: StoreSettings,
-        bent_normals: Sequence[NDArray[np.float32]],
+        further: Mapping[Further, Sequence[NDArray[np.float32]]],
     ) -> tuple[Path, ...]:
-        """The same with bent normals: (V_i, 3) float32 per instance, in the space of its mesh."""
+        """The same with more: some of what Family.further names, see write_vertex_ao."""
 
 
 class TextureWriter(Protocol):
@@ -106,7 +106,7 @@ class TextureWriter(Protocol):
 class Family:
     """Formats that one module reads.
 
-    poses : whether it reads animations; bent_normals : whether it writes them
+    poses : whether it reads animations; further : what it can hold at vertices besides ambient occlusion
     """
 
     module: str
@@ -114,7 +114,7 @@ class Family:
     writes: tuple[str, ...] = ()
     holds_textures: tuple[str, ...] = ()
     poses: bool = False
-    bent_normals: bool = False
+    further: tuple[Further, ...] = ()
 
 
 FAMILIES = (
@@ -124,10 +124,10 @@ FAMILIES = (
         writes=(".glb", ".gltf"),
         holds_textures=(".glb", ".gltf"),
         poses=True,
-        bent_normals=True,
+        further=("bent_normals", "mean_distance"),
     ),
     Family("obj", reads=(".obj",), writes=(".obj",), holds_textures=(".obj",)),
-    Family("ply", reads=(".ply",), writes=(".ply",)),
+    Family("ply", reads=(".ply",), writes=(".ply",), further=("mean_distance",)),
     Family("usd", reads=(".usd", ".usda", ".usdc", ".usdz"), writes=(".usda", ".usd", ".usdc")),
     Family("exchange", reads=(".stl", ".off", ".3mf", ".dae")),
 )
@@ -179,16 +179,16 @@ def load(
 
 
 def check_target(
-    scene: Scene, target: Path, store: StoreSettings, *, bent_normals: bool = False
+    scene: Scene, target: Path, store: StoreSettings, further: Collection[Further] = ()
 ) -> tuple[str, ...]:
     """Raise OutputError now where write_vertex_ao would refuse the target, before a long bake.
 
-    bent_normals : whether there will be some
+    further : what there will be besides ambient occlusion
     Returns what the user should know about the result, one line each.
     """
     writer = _writer(scene, target)
-    if bent_normals:
-        _bent_normal_writer(target)
+    if further:
+        _further_writer(target, further)
     return writer.check(scene, store, target)
 
 
@@ -197,29 +197,32 @@ def write_vertex_ao(
     ao: Sequence[NDArray[np.float32]],
     target: Path,
     store: StoreSettings,
-    bent_normals: Sequence[NDArray[np.float32]] | None = None,
+    further: Mapping[Further, Sequence[NDArray[np.float32]]] | None = None,
 ) -> tuple[Path, ...]:
     """Write the scene's asset with ambient occlusion at its vertices; the files written, the target first.
 
     ao : one (V_i,) float32 array per instance of the scene, in its order
-    bent_normals : one (V_i, 3) float32 array per instance, in the space of its mesh; or None
+    further : what else there is, per instance: bent normals (V_i, 3) float32, in the space of its mesh, mean
+        distances (V_i,) float32
     Raises OutputError where the format cannot hold it or the file cannot be written.
     """
     writer = _writer(scene, target)
-    if bent_normals is None:
+    if not further:
         return writer.write(scene, ao, target, store)
-    return _bent_normal_writer(target).write(scene, ao, target, store, bent_normals)
+    return _further_writer(target, further).write(scene, ao, target, store, further)
 
 
-def _bent_normal_writer(target: Path) -> BentNormalWriter:
+def _further_writer(target: Path, further: Collection[Further]) -> FurtherWriter:
+    """What writes the target, which holds all of this. Raises OutputError where it has no place for some of it."""
     suffix = target.suffix.lower()
-    for family in FAMILIES:
-        if suffix in family.writes and family.bent_normals:
-            return cast(BentNormalWriter, _module(family.module))
-    raise OutputError(
-        f"{target}: {suffix[1:].upper()} is not written with bent normals. "
-        "Write GLB instead (-o NAME.glb), or leave them out."
-    )
+    family = next(family for family in FAMILIES if suffix in family.writes)
+    for name in further:
+        if name not in family.further:
+            raise OutputError(
+                f"{target}: {suffix[1:].upper()} is not written with {name.replace('_', ' ')}. "
+                "Write GLB instead (-o NAME.glb), or leave that out."
+            )
+    return cast(FurtherWriter, _module(family.module))
 
 
 def check_texture_target(

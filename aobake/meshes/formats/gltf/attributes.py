@@ -12,6 +12,7 @@ from aobake.meshes.formats.gltf.document import Document
 from aobake.meshes.formats.gltf.element import Element
 from aobake.meshes.formats.gltf.geometry import PrimitiveReader
 from aobake.meshes.formats.gltf.store_bent_normals import BENT_NORMAL
+from aobake.meshes.formats.gltf.store_mean_distance import MEAN_DISTANCE
 from aobake.meshes.scene import Attribute
 
 __all__ = ["TANGENT", "SurfaceReader"]
@@ -23,6 +24,7 @@ TYPES = (
     (re.compile(TANGENT), ("VEC4",)),
     (re.compile("_AO"), ("SCALAR",)),
     (re.compile(BENT_NORMAL), ("VEC3",)),
+    (re.compile(MEAN_DISTANCE), ("SCALAR",)),
 )
 
 
@@ -39,7 +41,7 @@ class SurfaceReader:
     def attributes(
         self, primitive: Element, vertices: int, *, tangents: bool
     ) -> DeferredAttributes:
-        """TEXCOORD_n, COLOR_n, TANGENT, _AO and _BENT_NORMAL of a primitive with so many vertices.
+        """TEXCOORD_n, COLOR_n, TANGENT, _AO, _BENT_NORMAL and _MEAN_DISTANCE of a primitive with so many vertices.
 
         tangents : whether those of the file belong to the shape that the mesh is given
         Asking for one raises InputError where it is of another type or length, or cannot be read.

@@ -124,6 +124,12 @@ class Element:
         """Its name, '' where it has none."""
         return self.text("name", "")
 
+    @property
+    def extras(self) -> JsonObject:
+        """What applications have noted, by their keys; nothing where that is no object, which is allowed."""
+        found = self.value.get("extras")
+        return found if isinstance(found, dict) else {}
+
 
 def _integer(value: object, most: int, key: str, where: str) -> int:
     if isinstance(value, float) and value.is_integer():

@@ -61,6 +61,7 @@ class _MaterialReader:
             normal_scale=normal.number("scale", 1.0),
             occlusion_texture=self._texture(entry, "occlusionTexture"),
             occlusion_strength=occlusion.number("strength", 1.0),
+            extras=entry.extras,
         )
 
     def _base_color_texture(self, entry: Element) -> Texture | None:

@@ -11,19 +11,18 @@ from aobake.errors import OutputError
 from aobake.meshes.formats.gltf.columns import ColumnPool
 from aobake.meshes.formats.gltf.copies import primitives_of, shares, with_attribute
 from aobake.meshes.formats.gltf.edit import Edit
+from aobake.meshes.formats.gltf.means import Values
 from aobake.meshes.formats.gltf.places import Key, Place, touched_places, vertices_of
 from aobake.meshes.formats.gltf.source import GltfSource
 from aobake.meshes.formats.gltf.store_attribute import AttributeStore
 from aobake.meshes.formats.gltf.store_color import ColorStore
 from aobake.meshes.formats.gltf.store_occlusion import OcclusionStore
 from aobake.meshes.formats.gltf.stores import Store
-from aobake.meshes.normals import unit_rows
 from aobake.meshes.scene import Scene
 from aobake.settings import StoreSettings
 
 __all__ = ["chosen_store", "patch"]
 
-Values = NDArray[np.float32]
 Added = tuple[str, int]  # the name of an attribute, and its accessor
 
 
@@ -42,8 +41,8 @@ def patch(
 ) -> None:
     """Write what is kept at the vertices of every instance into the edit.
 
-    kept : how, and one float32 array per instance of the scene, in its order: (V_i,) of occlusion, or
-        (V_i, 3) of directions in the space of its mesh
+    kept : how, and one float32 array per instance of the scene, in its order: (V_i,) of occlusion and of
+        distances, (V_i, 3) of directions in the space of its mesh
     Meshes whose nodes differ in it are copied; the first keeps the original. Raises OutputError.
     """
     places = touched_places(source)
@@ -77,7 +76,7 @@ def _accessors(
 ) -> dict[int, dict[Key, tuple[Added, ...]]]:
     """node -> (mesh, primitive) -> the attributes that hold its values; their bytes go into the edit."""
     pool = ColumnPool()
-    columns = _columns(source, scene, _by_node(source, scene, values), places, store, pool)
+    columns = _columns(source, scene, _by_node(source, scene, values, store), places, store, pool)
     numbers = [
         edit.add_accessors(column, store.parts, normalized=_scaled(column, store))
         for column in pool.columns
@@ -96,16 +95,16 @@ def _scaled(column: NDArray[np.generic], store: Store) -> bool:
 
 
 def _by_node(
-    source: GltfSource, scene: Scene, ao: Sequence[Values]
+    source: GltfSource, scene: Scene, kept: Sequence[Values], store: Store
 ) -> dict[int, dict[Key, Values]]:
     """node -> (mesh, primitive) -> its values; GPU instances of a node share the mean of theirs."""
-    if not len(ao) == len(source.bindings) == len(scene.instances):
+    if not len(kept) == len(source.bindings) == len(scene.instances):
         raise OutputError(
-            f"{source.path}: there are values for {len(ao)} instances, and the scene that was read has "
+            f"{source.path}: there are values for {len(kept)} instances, and the scene that was read has "
             f"{len(source.bindings)}. Bake the scene as it was read."
         )
     gathered: dict[int, dict[Key, list[Values]]] = {}
-    for binding, instance, values in zip(source.bindings, scene.instances, ao, strict=True):
+    for binding, instance, values in zip(source.bindings, scene.instances, kept, strict=True):
         if values.shape[:1] != (len(scene.meshes[instance.mesh].vertices),):
             raise OutputError(
                 f"{source.path}: instance {instance.name!r} has {len(scene.meshes[instance.mesh].vertices)} "
@@ -114,24 +113,9 @@ def _by_node(
         node = gathered.setdefault(binding.node, {})
         node.setdefault((binding.mesh, binding.primitive), []).append(values)
     return {
-        node: {key: _mean(several) for key, several in parts.items()}
+        node: {key: store.mean(several) for key, several in parts.items()}
         for node, parts in gathered.items()
     }
-
-
-def _mean(several: list[Values]) -> Values:
-    """The mean of occlusion, within [0, 1]; that of directions, at unit length."""
-    if several[0].ndim == 2:
-        total = np.nan_to_num(np.sum(several, axis=0, dtype=np.float64))
-        return unit_rows(total).astype(np.float32)
-    if len(several) == 1:
-        mean = several[0]
-    else:
-        total = np.zeros(len(several[0]), np.float64)
-        for values in several:
-            total += np.nan_to_num(values, nan=1.0)
-        mean = (total / len(several)).astype(np.float32)
-    return np.clip(np.nan_to_num(mean, nan=1.0), 0.0, 1.0).astype(np.float32, copy=False)
 
 
 def _columns(

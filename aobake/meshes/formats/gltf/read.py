@@ -125,7 +125,7 @@ class _SceneBuilder:
         world = self.tree.world[binding.node]
         copies = gpu_instances(self.reader, node)
         if copies is None:
-            self._place(binding, self._known[key], world, node.name)
+            self._place(binding, self._known[key], world, node)
             return
         first = len(self.instances)
         if first + len(copies) > MOST_INSTANCES:
@@ -134,7 +134,7 @@ class _SceneBuilder:
             )
         for gpu, local in enumerate(copies):
             at = Binding(binding.node, binding.mesh, binding.primitive, gpu)
-            self._place(at, self._known[key], world @ local, node.name, stored_with=first)
+            self._place(at, self._known[key], world @ local, node, stored_with=first)
 
     def _skinned(
         self,
@@ -161,7 +161,7 @@ class _SceneBuilder:
             faces = faces[:, ::-1] if mirrored else faces
         posed = Geometry(skinned(shape.vertices, matrices), faces, normals)
         mesh = self._add_mesh(binding, primitive, posed, tangents=False)
-        self._place(binding, mesh, np.eye(4), node.name)
+        self._place(binding, mesh, np.eye(4), node)
         return True
 
     def _add_mesh(
@@ -182,6 +182,7 @@ class _SceneBuilder:
                 attributes=self.surfaces.attributes(
                     primitive, len(shape.vertices), tangents=tangents
                 ),
+                extras={**mesh.extras, **primitive.extras},
             )
         )
         return len(self.meshes) - 1
@@ -191,10 +192,16 @@ class _SceneBuilder:
         binding: Binding,
         mesh: int,
         transform: FloatArray,
-        name: str,
+        node: Element,
         stored_with: int | None = None,
     ) -> None:
         self.instances.append(
-            Instance(mesh=mesh, transform=transform, name=name, stored_with=stored_with)
+            Instance(
+                mesh=mesh,
+                transform=transform,
+                name=node.name,
+                stored_with=stored_with,
+                extras=node.extras,
+            )
         )
         self.bindings.append(binding)

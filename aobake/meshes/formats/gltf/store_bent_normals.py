@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.meshes.formats.gltf.edit import Edit
+from aobake.meshes.formats.gltf.means import mean_direction
 from aobake.meshes.formats.gltf.places import Key, Place
 
 __all__ = ["BENT_NORMAL", "BentNormalStore"]
@@ -18,6 +19,7 @@ class BentNormalStore:
 
     normalized = False
     parts: tuple[slice, ...] = (slice(None),)
+    mean = staticmethod(mean_direction)
 
     def check(self, place: Place) -> None:
         """Every primitive can hold it."""

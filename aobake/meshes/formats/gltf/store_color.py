@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from aobake.errors import InputError, OutputError
 from aobake.meshes.formats.gltf.edit import Edit
+from aobake.meshes.formats.gltf.means import mean_occlusion
 from aobake.meshes.formats.gltf.places import Key, Place
 
 __all__ = ["ColorStore"]
@@ -21,6 +22,7 @@ class ColorStore:
 
     normalized = True
     parts: tuple[slice, ...] = (slice(None),)
+    mean = staticmethod(mean_occlusion)
 
     def check(self, place: Place) -> None:
         """Raise OutputError where there are vertex colours that cannot be read."""

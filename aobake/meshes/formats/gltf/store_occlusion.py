@@ -15,6 +15,7 @@ from aobake.errors import OutputError
 from aobake.meshes.formats.gltf.edit import NAME, Edit
 from aobake.meshes.formats.gltf.gradient import coordinate, gradient_png
 from aobake.meshes.formats.gltf.looks import Look, give_looks, with_occlusion
+from aobake.meshes.formats.gltf.means import mean_occlusion
 from aobake.meshes.formats.gltf.places import Key, Place
 from aobake.meshes.formats.gltf.store_attribute import AO
 
@@ -51,6 +52,7 @@ class OcclusionStore:
 
     normalized = False
     parts: tuple[slice, ...] = (slice(None), slice(1, 2))
+    mean = staticmethod(mean_occlusion)
 
     def check(self, place: Place) -> None:
         """Raise OutputError where the primitive has no texture coordinate set left."""

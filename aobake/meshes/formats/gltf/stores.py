@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aobake.meshes.formats.gltf.edit import Edit
+from aobake.meshes.formats.gltf.means import Values
 from aobake.meshes.formats.gltf.places import Key, Place
 
 __all__ = ["Store"]
@@ -21,6 +23,9 @@ class Store(Protocol):
 
     parts: tuple[slice, ...]
     """Which components of a column each attribute reads."""
+
+    def mean(self, several: Sequence[Values]) -> Values:
+        """What is kept for GPU instances of one node, of the values of each."""
 
     def check(self, place: Place) -> None:
         """Raise OutputError where the primitive cannot hold it."""

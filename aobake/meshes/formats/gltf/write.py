@@ -24,12 +24,13 @@ from aobake.meshes.formats.gltf.places import touched_places
 from aobake.meshes.formats.gltf.sides import side_copies
 from aobake.meshes.formats.gltf.source import GltfSource
 from aobake.meshes.formats.gltf.store_bent_normals import BentNormalStore
+from aobake.meshes.formats.gltf.store_mean_distance import MeanDistanceStore
 from aobake.meshes.formats.gltf.stores import Store
 from aobake.meshes.formats.gltf.warnings import warnings_of
 from aobake.meshes.formats.split_corners import with_split_corners
 from aobake.meshes.lightmap import Lightmap
 from aobake.meshes.scene import Scene
-from aobake.settings import ImageSettings, StoreSettings
+from aobake.settings import Further, ImageSettings, StoreSettings
 
 __all__ = ["check", "check_texture", "write", "write_texture"]
 
@@ -81,12 +82,12 @@ def write(
     ao: Sequence[NDArray[np.float32]],
     target: Path,
     store: StoreSettings,
-    bent_normals: Sequence[NDArray[np.float32]] | None = None,
+    further: Mapping[Further, Sequence[NDArray[np.float32]]] | None = None,
 ) -> tuple[Path, ...]:
     """Write the scene's asset with ambient occlusion; the files written, the target first.
 
     ao : one (V_i,) float32 array per instance of the scene, in its order
-    bent_normals : one (V_i, 3) float32 array per instance, in the space of its mesh; or None
+    further : bent normals, (V_i, 3) float32 per instance in the space of its mesh, and mean distances, (V_i,)
     Patches the document that the scene was read from, or makes a new one for a scene from elsewhere.
     Raises OutputError; a file appears whole or not at all.
     """
@@ -95,8 +96,11 @@ def write(
         layout = plan_layout(source.document, target)
         edit = Edit(source.document, layout.buffer, layout.start)
         kept: list[tuple[Store, Sequence[NDArray[np.float32]]]] = [(chosen_store(store), ao)]
-        if bent_normals is not None:
-            kept.append((BentNormalStore(), in_stored_space(scene, bent_normals)))
+        further = further or {}
+        if "bent_normals" in further:
+            kept.append((BentNormalStore(), in_stored_space(scene, further["bent_normals"])))
+        if "mean_distance" in further:
+            kept.append((MeanDistanceStore(), further["mean_distance"]))
         patch(edit, source, scene, kept)
         files = _files(layout, edit)
     return _written(files, target)

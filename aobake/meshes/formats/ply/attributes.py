@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from aobake.errors import InputError
 from aobake.meshes.attributes import DeferredAttributes
 from aobake.meshes.formats.ply.body import Body, open_body
-from aobake.meshes.formats.ply.columns import AO, COLOR
+from aobake.meshes.formats.ply.columns import AO, COLOR, MEAN_DISTANCE
 from aobake.meshes.formats.ply.header import Element, Header, Property
 from aobake.meshes.formats.ply.layout import Layout, layouts, list_values, scalar_values
 from aobake.meshes.formats.tokens import IndexArray
@@ -39,7 +39,7 @@ class Corners:
 def attributes_of(
     data: bytes, header: Header, where: str, corners: Corners | None
 ) -> DeferredAttributes:
-    """TEXCOORD_0, COLOR_0 and _AO, where the file has them.
+    """TEXCOORD_0, COLOR_0, _AO and _MEAN_DISTANCE, where the file has them.
 
     corners : None where some triangles have none, being of strips
     Asking for one raises InputError where it cannot be read. The file is opened for each anew: the numbers
@@ -60,6 +60,8 @@ def attributes_of(
         readers["COLOR_0"] = partial(_columns, data, header, where, color)
     if occlusion := _first_columns(vertex, ((AO,),)):
         readers["_AO"] = partial(_columns, data, header, where, occlusion)
+    if distance := _first_columns(vertex, ((MEAN_DISTANCE,),)):
+        readers["_MEAN_DISTANCE"] = partial(_columns, data, header, where, distance)
     return DeferredAttributes(readers)
 
 

@@ -13,10 +13,20 @@ from aobake.meshes.formats.ply.header import Element, Property
 from aobake.meshes.formats.ply.layout import Layout, scalar_values
 from aobake.settings import StoreSettings
 
-__all__ = ["AO", "COLOR", "Changes", "Held", "NewColumn", "byte_colors", "changes", "held_by"]
+__all__ = [
+    "AO",
+    "COLOR",
+    "MEAN_DISTANCE",
+    "Changes",
+    "Held",
+    "NewColumn",
+    "byte_colors",
+    "changes",
+    "held_by",
+]
 
 COLOR = ("red", "green", "blue")
-AO = "ao"
+AO, MEAN_DISTANCE = "ao", "mean_distance"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +63,19 @@ def held_by(element: Element, store: StoreSettings, where: str) -> Held:
 
     Raises OutputError where colours are there in part, or as lists.
     """
-    ao = element.scalar(AO)
-    if ao is None and any(prop.name == AO for prop in element.properties):
-        raise OutputError(
-            f"{where}: the vertices have a list named {AO}. Rename it, or write GLB instead."
-        )
+    ao = _number(element, AO, where)
     colors = _color_properties(element, where) if store.store == "color" else []
     return Held(tuple(colors), ao)
+
+
+def _number(element: Element, name: str, where: str) -> Property | None:
+    """A property of the vertices that is a number, or None. Raises OutputError for a list of this name."""
+    found = element.scalar(name)
+    if found is None and any(prop.name == name for prop in element.properties):
+        raise OutputError(
+            f"{where}: the vertices have a list named {name}. Rename it, or write GLB instead."
+        )
+    return found
 
 
 def byte_colors(ao: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -71,13 +87,18 @@ def byte_colors(ao: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def changes(
-    body: Body, layout: Layout, ao: NDArray[np.float32], store: StoreSettings, where: str
+    body: Body,
+    layout: Layout,
+    ao: NDArray[np.float32],
+    distance: NDArray[np.float32] | None,
+    store: StoreSettings,
+    where: str,
 ) -> Changes:
     """What has to be done to the vertex element so that it holds ambient occlusion.
 
-    ao : (V,) float32
+    ao : (V,) float32; distance : the same of mean distances, or None
     Existing colours are multiplied and keep their type. A property `ao` that is there is overwritten
-    where it is a float or a double, and else replaced by a float.
+    where it is a float or a double, and else replaced by a float; so is `mean_distance`.
     Raises OutputError where colours are there in part, or as lists.
     """
     held = held_by(layout.element, store, where)
@@ -90,12 +111,16 @@ def changes(
         ]
         if not held.colors:
             new += [NewColumn(name, "u1", byte_colors(ao)) for name in COLOR]
-    if held.ao is not None and held.ao.type[0] == "f":
-        replaced.append((held.ao, ao.astype(held.ao.type)))
-    else:
-        if held.ao is not None:
-            removed.append(held.ao)
-        new.append(NewColumn(AO, "f4", ao.astype(np.float32)))
+    numbers = {AO: (held.ao, ao)}
+    if distance is not None:
+        numbers[MEAN_DISTANCE] = _number(layout.element, MEAN_DISTANCE, where), distance
+    for name, (before, values) in numbers.items():
+        if before is not None and before.type[0] == "f":
+            replaced.append((before, values.astype(before.type)))
+            continue
+        if before is not None:
+            removed.append(before)
+        new.append(NewColumn(name, "f4", values.astype(np.float32)))
     return Changes(tuple(replaced), tuple(removed), tuple(new))
 
 

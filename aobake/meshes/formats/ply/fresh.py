@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aobake.meshes.formats.merged import Merged
-from aobake.meshes.formats.ply.columns import AO, COLOR, byte_colors
+from aobake.meshes.formats.ply.columns import AO, COLOR, MEAN_DISTANCE, byte_colors
 from aobake.meshes.scene import FloatArray
 from aobake.settings import StoreSettings
 
@@ -14,9 +15,12 @@ __all__ = ["document"]
 NAMES = {"u1": "uchar", "f4": "float", "f8": "double"}
 
 
-def document(mesh: Merged, store: StoreSettings) -> list[bytes]:
+def document(
+    mesh: Merged, store: StoreSettings, distance: NDArray[np.float32] | None = None
+) -> list[bytes]:
     """The pieces of a binary PLY file (little endian): vertices, normals where given, colours, ao, faces.
 
+    distance : (V,) mean distances, for which there is a property as well; or None
     Coordinates are floats where those are the same numbers, else doubles.
     """
     columns = [("x", 0), ("y", 1), ("z", 2)]
@@ -27,6 +31,8 @@ def document(mesh: Merged, store: StoreSettings) -> list[bytes]:
     if store.store == "color":
         fields += [(name, "u1") for name in COLOR]
     fields.append((AO, "f4"))
+    if distance is not None:
+        fields.append((MEAN_DISTANCE, "f4"))
     rows = np.empty(len(mesh.vertices), np.dtype([(name, "<" + type_) for name, type_ in fields]))
     for name, axis in columns:
         rows[name] = mesh.vertices[:, axis]
@@ -36,6 +42,8 @@ def document(mesh: Merged, store: StoreSettings) -> list[bytes]:
         for name in COLOR:
             rows[name] = byte_colors(mesh.ao)
     rows[AO] = mesh.ao
+    if distance is not None:
+        rows[MEAN_DISTANCE] = distance
     return [_header(fields, len(rows), len(mesh.faces)), rows.tobytes(), _faces(mesh)]
 
 

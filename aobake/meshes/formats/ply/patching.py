@@ -22,11 +22,17 @@ SIZED_NAMES = {"u1": "uint8", "f4": "float32"}
 
 
 def patched(
-    data: bytes, header: Header, ao: NDArray[np.float32], store: StoreSettings, where: str
+    data: bytes,
+    header: Header,
+    ao: NDArray[np.float32],
+    distance: NDArray[np.float32] | None,
+    store: StoreSettings,
+    where: str,
 ) -> list[bytes | memoryview]:
     """The pieces of the file with ambient occlusion at its vertices; all other bytes are the same.
 
-    ao : (V,) float32. Raises OutputError where it does not fit the file.
+    ao : (V,) float32; distance : the same of mean distances, or None
+    Raises OutputError where it does not fit the file.
     """
     body = open_body(data, header, where)
     layout = next(rows for rows in layouts(body, header, where) if rows.element.name == "vertex")
@@ -34,7 +40,7 @@ def patched(
         raise OutputError(
             f"{where}: {len(ao)} values for the {layout.element.count} vertices of the PLY file; bake it again."
         )
-    change = changes(body, layout, ao, store, where)
+    change = changes(body, layout, ao, distance, store, where)
     head = _header(data, header, layout.element, change)
     if isinstance(body, BinaryBody) and layout.stride is not None:
         rows = _binary_rows(body, layout, change)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from aobake.meshes.formats.ply.fresh import document
 from aobake.meshes.formats.ply.patching import patched
 from aobake.meshes.formats.ply.source import PlySource
 from aobake.meshes.scene import Scene
-from aobake.settings import StoreSettings
+from aobake.settings import Further, StoreSettings
 
 __all__ = ["check", "write"]
 
@@ -45,23 +45,31 @@ def check(scene: Scene, store: StoreSettings, target: Path) -> tuple[str, ...]:
 
 
 def write(
-    scene: Scene, ao: Sequence[NDArray[np.float32]], target: Path, store: StoreSettings
+    scene: Scene,
+    ao: Sequence[NDArray[np.float32]],
+    target: Path,
+    store: StoreSettings,
+    further: Mapping[Further, Sequence[NDArray[np.float32]]] | None = None,
 ) -> tuple[Path, ...]:
     """Write the scene's PLY file with ambient occlusion, or a new one where it was read from no PLY file.
 
     ao : one (V_i,) float32 array per instance
     store : "color" gives red, green, blue and ao; any other ao alone
+    further : mean distances, as ao
     Returns the target. Raises OutputError; nothing is half-written.
     """
     check(scene, store, target)
+    distance = None if further is None else further.get("mean_distance")
     if not isinstance(scene.source, PlySource):
-        write_files({target: document(merged(scene, ao), store)})
+        together = (
+            None if distance is None else np.concatenate([np.zeros(0, np.float32), *distance])
+        )
+        write_files({target: document(merged(scene, ao), store, together)})
         return (target,)
     if len(ao) != 1:
         raise OutputError(
             f"{target}: a PLY file is one mesh, and there are values for {len(ao)}. Write GLB."
         )
-    write_files(
-        {target: patched(scene.source.data, scene.source.header, ao[0], store, str(target))}
-    )
+    source, own = scene.source, None if distance is None else distance[0]
+    write_files({target: patched(source.data, source.header, ao[0], own, store, str(target))})
     return (target,)

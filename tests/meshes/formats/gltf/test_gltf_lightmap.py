@@ -470,10 +470,10 @@ def test_nothing_is_written_where_the_image_cannot_be(
     before = sorted(tmp_path.iterdir())
     stage = files._stage
 
-    def failing(target: Path, content: files.Content) -> str:
+    def failing(target: Path, content: files.Content, sync: bool) -> str:
         if target.suffix == ".gltf":  # the last one of all
             raise OSError(28, "No space left on device")
-        return stage(target, content)
+        return stage(target, content, sync)
 
     monkeypatch.setattr(files, "_stage", failing)
     with pytest.raises(OutputError, match="No space left"):
