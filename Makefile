@@ -27,7 +27,7 @@ demo: install
 	@$(BIN)/aobake demo -o aobake-demo --force
 
 test: install
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest -n auto --dist loadfile
 
 install: $(STAMP)
 

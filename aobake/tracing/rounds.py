@@ -4,21 +4,24 @@ Along a Hilbert curve over the hemisphere the squared differences D of n success
 next to an edge of what is visible. Where that edge is a line that the rays resolve, only they carry an error,
 the others hit or miss whichever way the set is turned, and D grows as the square root of n. Where it is finer
 than that, among leaves, rays err independently of each other, and D grows as n. Which of the two it is, rays
-farther apart tell: those in one packet of eight differ APART as often as successive ones along a line, and
-equally often in noise. So there is a part of D that is no line, twice the variance E of so many independent rays, and
+farther apart tell: those in one packet of eight differ APART times as often as successive ones along a line,
+and just as often in noise. So the part of D that is no line can be told. Half of it is E, the variance of a sum of
+rays that err independently, and
 
     standard error = sqrt((SPREAD + FEW / n) D + NOISE (1 - A^4) E + UNSEEN^2) / n
 
-at a point of openness A. It is fitted to the errors of seven scenes with lines and five of foliage, with each of
-16 to 4,096 rays (benchmarks/honesty.py; docs/accuracy.md). The constants:
+at a point of openness A. The constants are fitted to the errors of 16 to 4,096 rays on seven scenes of lines and five
+of foliage (measured again by benchmarks/honesty.py; docs/accuracy.md):
 
 - SPREAD: for independent rays it would be 1/2; a well-spread set has a tenth of that left, one that grows more.
-- FEW: less is left the more rays share the line.
-- NOISE: of E, which is known from few differences, so that lines look like noise now and then.
-- 1 - A^4: what hides little of the sky looks like noise to few rays as well, but stands together mostly.
+- FEW: a dozen rays are spread less well than a thousand.
+- NOISE: less than 1, since E is known from few differences only: now and then a line looks like noise.
+- 1 - A^4: a small thing before the sky looks like noise to few rays as well, but mostly stands alone.
 - UNSEEN: what is too small to be met by any ray. A point where all rays agree is not exact.
 
-The sums of the parts of a set that grew give the line and the noise of the whole, and what more rays will do.
+The sums of the parts of a set that grew give the line and the noise of the whole. What more rays will do is expected as
+if all were lines: that noise goes on is too weak a guess to spend rays on (128 to 1,024 rays for points of one sky,
+instead of 256 to 512).
 
 Sources: J. von Neumann et al., The mean square successive difference, Annals of Mathematical Statistics 12,
 1941; its use for systematic samples: K. Wolter, JASA 79, 1984; the part that does not fall with the distance:

@@ -42,6 +42,8 @@ def bucket(endpoint: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> st
     }.items():
         monkeypatch.setenv(name, value)
     name = f"aobake{abs(hash(tmp_path))}"
+    # fsspec keeps what was opened for a kind of store: an earlier test may have done so without keys.
+    fsspec.get_filesystem_class("s3").clear_instance_cache()
     fsspec.filesystem("s3", skip_instance_cache=True).mkdir(f"/{name}")
     return f"s3://{name}"
 
