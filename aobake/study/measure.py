@@ -52,7 +52,7 @@ class Extent:
         """About how many rays all of it takes, for an asset with so many vertices."""
         points = min(self.points, whole)
         curves = sum(self.budgets) + len(KINDS) * sum(self.sets)
-        curves += sum(2.0 * 0.18 * t ** (-4.0 / 3.0) for t in self.tolerances)
+        curves += sum(2.0 * 0.4 * t ** (-4.0 / 3.0) for t in self.tolerances)
         methods = whole * 7.0 * sum(self.methods) if self.methods else 0.0
         at_points = points * (self.reference + self.seeds * curves)
         return float(at_points + self.surface * self.surface_reference + methods)

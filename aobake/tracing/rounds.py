@@ -63,7 +63,7 @@ APART = sum((LANES - k) * math.sqrt(k) for k in range(1, LANES)) / PAIRS
 BISECTIONS = 60
 BINS_PER_OCTAVE = 64
 BINS = 80 * BINS_PER_OCTAVE  # down to a variance of 2^-60 with a million rays
-SURELY = 1.3  # times the tolerance: what few rays expect is off by an eighth, mostly
+SURELY = 1.1  # times the tolerance: more at once costs rays on lines, less at once rounds
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
