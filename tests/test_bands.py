@@ -17,14 +17,18 @@ from aobake import (
     Mesh,
     Scene,
     bake_texture,
-    bands,
 )
-from aobake.bands import Band, TracedBand, bands_of
-from aobake.lightmaps import prepare_texture
+from aobake.lightmaps import (
+    Band,
+    TracedBand,
+    bands,
+    bands_of,
+    prepare_texture,
+    put_together,
+    trace_bands,
+)
 from aobake.meshes.scene import Attribute, Image, Material, Texture
-from aobake.pages import put_together
 from aobake.settings import ToleranceOf
-from aobake.texels import trace_bands
 from tests.scenes import box, floor, icosphere, moved
 
 BAKE = BakeSettings(size=40, rays=32, denoise="off", blend="multiply", normal_map=True, threads=1)
@@ -93,8 +97,8 @@ def cut_at(rows: Sequence[range], monkeypatch: pytest.MonkeyPatch) -> None:
         pages = range(len(bake.layout.pages))
         return tuple(Band(page=page, rows=some) for page in pages for some in rows)
 
-    monkeypatch.setattr("aobake.pages.bands_of", cut)
-    monkeypatch.setattr("aobake.lightmaps.bands_of", cut)
+    monkeypatch.setattr("aobake.lightmaps.pages.bands_of", cut)
+    monkeypatch.setattr("aobake.lightmaps.bake.bands_of", cut)
 
 
 @pytest.mark.parametrize("supersample", [1, 2])
@@ -148,7 +152,7 @@ def test_bands_that_others_traced_meet_a_tolerance_in_the_same_way(
 
 def test_a_handed_on_layout_is_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
     layout = prepare_texture(scene(), BAKE).layout
-    monkeypatch.delattr("aobake.lightmaps.lay_out")
+    monkeypatch.delattr("aobake.lightmaps.bake.lay_out")
     again = prepare_texture(scene(), BAKE, layout=pickle.loads(pickle.dumps(layout)))
     assert len(again.layout.pages) == 1
     first, second = again.layout.placings[2:]

@@ -27,7 +27,7 @@ LAYERS = (
     ("atlas",),
     ("shading",),
     (
-        "plan", "planning", "bake", "bands", "bent_texels", "texel_samples", "texels", "pages", "lightmaps",
+        "plan", "planning", "bake", "lightmaps",
         "previews", "results", "environment", "study", "report", "demo", "viewer", "__init__",
     ),
     ("flags", "patterns", "config_file", "config", "jobs"),

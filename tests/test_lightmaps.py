@@ -15,10 +15,10 @@ from aobake import (
     Mesh,
     Scene,
     bake_texture,
-    bands,
     images,
 )
 from aobake.atlas.lookup import sample
+from aobake.lightmaps import bands
 from aobake.meshes.scene import Attribute, Image, Texture
 from tests.scenes import FloatArray, Triangles, box, icosphere, moved, patch
 

@@ -23,8 +23,8 @@ from aobake.files import write_files
 
 if TYPE_CHECKING:
     from aobake.atlas.layout import Layout
-    from aobake.bands import TracedBand
     from aobake.jobs import Bake, Job, Progress
+    from aobake.lightmaps import TracedBand
     from aobake.meshes.scene import Scene
     from aobake.results import BakedTexture
     from aobake.settings import BakeSettings
@@ -96,10 +96,8 @@ def make_part(part: Part, job: Job, target: Path) -> None:
     target : the folder of all outputs
     Raises what load and bake_texture do, and InputError where a file of another part is not sound.
     """
-    from aobake.bands import bands_of
     from aobake.jobs import opened
-    from aobake.lightmaps import prepare_texture
-    from aobake.texels import trace_bands
+    from aobake.lightmaps import bands_of, prepare_texture, trace_bands
 
     scene, settings = opened(job, {}), job.chosen.bake
     if part.step == "layout":
@@ -119,8 +117,7 @@ def join_bake(part: Part, target: Path) -> Bake:
     It traces nothing. It raises what bake_texture does, and InputError where a file of another part is not
     sound.
     """
-    from aobake.lightmaps import prepare_texture
-    from aobake.pages import put_together
+    from aobake.lightmaps import prepare_texture, put_together
 
     def bake(
         scene: Scene, settings: BakeSettings, *, progress: Progress | None = None

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from aobake.atlas.layout import Page
 from aobake.atlas.post import TracedPage, finished, finished_bent
 from aobake.atlas.seams import Seams, find_seams, joined_seams
-from aobake.bands import Band, Marked, Tally, TextureBake, TracedBand, bands_of
 from aobake.errors import InputError
 from aobake.findings import Finding, FindingKind
+from aobake.lightmaps.bands import Band, Marked, Tally, TextureBake, TracedBand, bands_of
 from aobake.meshes.lightmap import BentPages, Lightmap
 from aobake.meshes.scene import Scene
 from aobake.occlusion import STATES

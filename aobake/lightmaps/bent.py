@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from aobake.atlas.layout import Page
 from aobake.atlas.tangents import in_tangent_space, placed_tangents, tangents_at_corners
-from aobake.bands import TextureBake
+from aobake.lightmaps.bands import TextureBake
 from aobake.meshes.normals import unit_rows
 from aobake.meshes.scene import FloatArray
 from aobake.points import SurfacePoints

@@ -1,7 +1,7 @@
 """A bake to textures: scene and settings in, images with their error out. Touches no file.
 
 It is three steps, which may be taken in different processes: everything is decided (prepare_texture), bands of
-texels are traced (texels.trace_bands), and pages are put together from them (pages.put_together).
+texels are traced (trace_bands), and pages are put together from them (put_together).
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ import numpy as np
 from aobake.atlas.denoise import check_denoiser
 from aobake.atlas.layout import Layout, lay_out
 from aobake.atlas.material_texels import MaterialTexels
-from aobake.bands import TextureBake, bands_of
+from aobake.lightmaps.bands import TextureBake, bands_of
+from aobake.lightmaps.pages import put_together
+from aobake.lightmaps.texels import trace_bands
 from aobake.meshes.scene import Scene
 from aobake.meshes.surfaces import surfaces_of
 from aobake.occlusion import compile_for
 from aobake.open_sky import sky_over
-from aobake.pages import put_together
 from aobake.plan import texture_plan
 from aobake.points import points_on_faces, vertex_points
 from aobake.prepare import Prepared, build, in_scene_units, lowest, refuse
 from aobake.results import BakedTexture
 from aobake.settings import BakeSettings
 from aobake.stages import timed
-from aobake.texels import trace_bands
 
 __all__ = ["bake_texture", "prepare_texture"]
 

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from aobake.atlas.layout import Page
 from aobake.atlas.post import TracedPage
 from aobake.atlas.rasterize import Texels, placed_faces, texels
-from aobake.bands import Band, TextureBake, TracedBand
-from aobake.bent_texels import PageFrames
+from aobake.lightmaps.bands import Band, TextureBake, TracedBand
+from aobake.lightmaps.bent import PageFrames
+from aobake.lightmaps.samples import Counts, OpenPage, Samples, sampled, shading_points
 from aobake.meshes.normals import unit_rows
 from aobake.meshes.scene import Scene
 from aobake.stages import timed
-from aobake.texel_samples import Counts, OpenPage, Samples, sampled, shading_points
 
 __all__ = ["trace_bands"]
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from aobake.atlas.layout import Page
 from aobake.atlas.rasterize import PlacedFaces, Texels
-from aobake.bands import Marked, TextureBake
-from aobake.bent_texels import PageFrames
 from aobake.findings import EXAMPLES, FindingKind
+from aobake.lightmaps.bands import Marked, TextureBake
+from aobake.lightmaps.bent import PageFrames
 from aobake.meshes.scene import FloatArray
 from aobake.occlusion import STATES, occlusion_at
 from aobake.points import SurfacePoints, points_on_faces
