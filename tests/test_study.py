@@ -26,6 +26,7 @@ from aobake.study import (
 )
 from aobake.study.curves import level_of
 from aobake.study.directions import KINDS, compared_sets
+from aobake.study.reference import digest
 from tests.scenes import floor, icosphere, joined
 
 SMALL = Extent(
@@ -179,17 +180,22 @@ def test_the_reference_is_kept_for_the_same_asset_and_no_other(tmp_path: Path) -
         return np.array([0.25, 0.5])
 
     for settings in (BakeSettings(), BakeSettings(rays=8, threads=1)):
-        kept = kept_reference(tmp_path, asset(), settings, SMALL)
-        assert kept(find).tolist() == [0.25, 0.5]
+        known = digest(asset(), settings, (400, 2048))
+        assert kept_reference(tmp_path)(known, find).tolist() == [0.25, 0.5]
     assert len(asked) == 1
     other = BakeSettings(max_distance=1.0)
-    kept_reference(tmp_path, asset(), other, SMALL)(find)
-    kept_reference(tmp_path, Scene.from_arrays(*icosphere(1)), BakeSettings(), SMALL)(find)
-    assert len(asked) == 3
+    ball = Scene.from_arrays(*icosphere(1))
+    for unknown in (
+        digest(asset(), other, (400, 2048)),
+        digest(ball, BakeSettings(), (400, 2048)),
+        digest(asset(), BakeSettings(), (400, 4096)),
+    ):
+        kept_reference(tmp_path)(unknown, find)
+    assert len(asked) == 4
     for path in tmp_path.glob("*.npy"):
         path.write_bytes(b"damaged")
-    kept_reference(tmp_path, asset(), BakeSettings(), SMALL)(find)
-    assert len(asked) == 4
+    kept_reference(tmp_path)(digest(asset(), BakeSettings(), (400, 2048)), find)
+    assert len(asked) == 5
 
 
 def test_what_would_take_too_long_is_refused_before_it_starts() -> None:

@@ -2,26 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from aobake import SettingsError
 from aobake.cli import terminal
 from aobake.cli.app import Parameter
 from aobake.cli.leaving import leaving_promptly
 from aobake.cli.options import COMMON, ConfigOptions, Output, SourceOptions, TraceFlags
-from aobake.cli.output import check_target, make_folder
+from aobake.cli.output import check_target
+from aobake.files import make_folder
+
+if TYPE_CHECKING:
+    from aobake import BakeSettings, Scene
+    from aobake.study import Picture, Study
 
 __all__ = ["study"]
 
-QUICK_PICTURES, PICTURES = (16, 64, 256), (4, 16, 64, 256, 1024)
-QUICK_REFERENCE, REFERENCE = 1024, 8192
+SIZE, QUICK_SIZE = 512, 256  # of a texture, in pixels
 
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class ExtentOptions:
     """How much is measured."""
+
+    texture: bool = False
+    """Measure a bake to a texture, with and without denoising, instead of one to vertices."""
+
+    size: int | None = None
+    """Width and height of that texture, in pixels. [default: 512, with --quick 256]"""
 
     quick: bool = False
     """Measure less: half a minute for an asset of 20,000 faces."""
@@ -32,6 +44,14 @@ class ExtentOptions:
     def __post_init__(self) -> None:
         if not self.time_limit > 0.0:
             raise SettingsError(f"--time-limit is {self.time_limit:g}; seconds above 0 are needed.")
+        if self.size is not None and not self.texture:
+            raise SettingsError("--size is that of a texture: give --texture as well.")
+
+    @property
+    def image(self) -> dict[str, object]:
+        """The size of the texture, as a flag: that of an aobake.toml is for bakes."""
+        usual = QUICK_SIZE if self.quick else SIZE
+        return {"size": usual if self.size is None else self.size}
 
 
 @Parameter(name="*", group=COMMON)
@@ -62,10 +82,11 @@ def study(
 ) -> int:
     """Measure what accuracy costs in time on an asset.
 
-    Compares fixed numbers of rays, tolerances, sets of directions and methods
-    with a converged reference, which is kept in the folder for the next run.
-    Writes index.html, a page that explains itself, study.json, study.csv and
-    the plots as SVG and PNG.
+    Compares fixed numbers of rays and tolerances with a converged reference,
+    which is kept in the folder for the next run: at vertices, with sets of
+    directions and methods, or (--texture) in a texture, with and without
+    denoising. Writes index.html, a page that explains itself, study.json,
+    study.csv and the plots as SVG and PNG.
 
     Parameters
     ----------
@@ -74,19 +95,10 @@ def study(
     output:
         The folder to write into; it is made if needed.
     """
-    chosen = config.configured(input, trace).bake
+    chosen = config.configured(input, trace, extent.image).bake
 
     from aobake import load
-    from aobake.study import (
-        check_plots,
-        kept_reference,
-        level_pictures,
-        measure,
-        outputs,
-        study_extent,
-        summary,
-        write_study,
-    )
+    from aobake.study import check_plots, outputs, summary, write_study
 
     check_plots()
     with leaving_promptly():
@@ -95,23 +107,8 @@ def study(
     try:
         for target in outputs(output):
             check_target(target, force=common.force)
-        measures = study_extent(quick=extent.quick)
         with leaving_promptly(), terminal.progress_bar(quiet=common.quiet) as progress:
-            measured = measure(
-                scene,
-                chosen,
-                measures,
-                time_limit=extent.time_limit,
-                kept=kept_reference(output, scene, chosen, measures),
-                progress=progress,
-            )
-            pictures = level_pictures(
-                scene,
-                chosen,
-                QUICK_PICTURES if extent.quick else PICTURES,
-                QUICK_REFERENCE if extent.quick else REFERENCE,
-                "320x240" if extent.quick else "480x360",
-            )
+            measured, pictures = _measured(scene, chosen, extent, output, progress)
         write_study(output, measured, pictures)
     except BaseException:
         if made and not any(output.iterdir()):
@@ -120,3 +117,31 @@ def study(
     if not common.quiet:
         terminal.say(*summary(measured))
     return 0
+
+
+def _measured(
+    scene: Scene,
+    settings: BakeSettings,
+    extent: ExtentOptions,
+    folder: Path,
+    progress: terminal.Progress | None,
+) -> tuple[Study, Sequence[Sequence[Picture]]]:
+    """The study that was asked for, and its pictures."""
+    from aobake.study import (
+        kept_reference,
+        level_pictures,
+        measure,
+        measure_texture,
+        study_extent,
+        texture_extent,
+    )
+
+    limit, kept = extent.time_limit, kept_reference(folder)
+    if extent.texture:
+        much = texture_extent(quick=extent.quick)
+        return measure_texture(
+            scene, settings, much, time_limit=limit, kept=kept, progress=progress
+        )
+    measures = study_extent(quick=extent.quick)
+    found = measure(scene, settings, measures, time_limit=limit, kept=kept, progress=progress)
+    return found, level_pictures(scene, settings, measures)

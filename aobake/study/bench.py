@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,13 @@ from aobake.occlusion import occlusion_at
 from aobake.points import SurfacePoints, points_on_faces, vertex_points
 from aobake.prepare import Prepared, build, in_scene_units, lowest
 from aobake.settings import BakeSettings
+from aobake.study.curves import Run
+from aobake.study.ways import fixed
 from aobake.tracing.estimate import Estimates, Request, estimate
 
-__all__ = ["Bench", "Surface", "bench_of", "surface_of_bench"]
+__all__ = ["REFERENCE_SEED", "Bench", "Surface", "bench_of", "surface_of_bench"]
 
 FloatArray = NDArray[np.float64]
-Run = tuple[FloatArray, FloatArray, float, float]
 
 REFERENCE_SEED = 0x5EED
 APART = 1 << 40  # numbers of points whose directions nothing else has
@@ -77,7 +78,7 @@ class Bench:
 
     def fixed(self, rays: int, seed: int) -> BakeSettings:
         """The asset's settings with a fixed number of rays."""
-        return replace(self.settings, rays=rays, seed=seed, tolerance=None, quality=None)
+        return fixed(self.settings, rays, seed)
 
     def reference(self, rays: int) -> FloatArray:
         """The true values, as nearly as so many rays tell."""

@@ -6,13 +6,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Curve", "Level", "Study", "level_of", "needed", "pareto"]
+__all__ = ["Curve", "Level", "Run", "Study", "What", "level_of", "needed", "pareto"]
 
 FloatArray = NDArray[np.float64]
+Run = tuple[FloatArray, FloatArray, float, float]  # values, standard errors, rays a point, seconds
+What = Literal["vertices", "texels"]
 
 STEADY = (16.0, 1024.0)  # rays between which a slope is fitted
 
@@ -23,7 +26,7 @@ class Level:
 
     setting : what was asked for: a number of rays, or a tolerance
     rays : a point, in the mean
-    seconds : of tracing the whole asset in this way, the median of repeats; least and most of them
+    seconds : for the whole asset in this way, the median of repeats; least and most of them
     rmse, p99, max : of the true error, over all points and seeds
     rmse_least, rmse_most : of single seeds
     reported : root mean square of the standard errors that were reported
@@ -44,14 +47,23 @@ class Level:
     within_2: float
     within_4: float
 
+    @property
+    def asked(self) -> float:
+        """The rays a point that were asked for, of which points under an open sky take none; else those spent."""
+        return float(self.setting) if self.setting.isdigit() else self.rays
+
 
 @dataclass(frozen=True, kw_only=True)
 class Curve:
-    """One way to spend rays, at several levels."""
+    """One way to spend rays, at several levels.
+
+    kind : "budget", "tolerance", "directions" or "method"; denoised : whether a denoiser smoothed what came
+    """
 
     name: str
     kind: str
     levels: tuple[Level, ...]
+    denoised: bool = False
 
     @property
     def slope(self) -> float | None:
@@ -59,7 +71,7 @@ class Curve:
         used = [
             level
             for level in self.levels
-            if STEADY[0] <= level.rays <= STEADY[1] and level.rmse > 0.0
+            if STEADY[0] <= level.asked <= STEADY[1] and level.rmse > 0.0
         ]
         if len(used) < 2:
             return None
@@ -71,16 +83,17 @@ class Curve:
 class Study:
     """All that was measured on one asset.
 
-    points : how many of its vertices were looked at; vertices : how many it has
+    what : what its points are; points : how many of them were looked at; whole : how many it has
     reference_rays : a point, of what errors are measured against
-    curves : fixed budgets, tolerances, and sets of directions; all errors at vertices
-    surface : point sampling and least squares; errors of what is interpolated over the surface
+    curves : fixed budgets, tolerances, and at vertices sets of directions; all errors at the points
+    surface : point sampling and least squares; errors of what vertices interpolate to over the surface
     facts : settings, versions, the machine and its load
     """
 
     asset: str
+    what: What
     points: int
-    vertices: int
+    whole: int
     reference_rays: int
     curves: tuple[Curve, ...]
     surface: tuple[Curve, ...]
@@ -88,16 +101,22 @@ class Study:
 
     @property
     def fixed(self) -> Curve:
-        """The curve of fixed budgets."""
+        """The curve of fixed budgets, as they were traced."""
         return self.curves[0]
 
+    @property
+    def denoised(self) -> Curve | None:
+        """The curve of fixed budgets that were denoised; None where none were."""
+        return next((c for c in self.curves if c.kind == "budget" and c.denoised), None)
 
-def level_of(
-    setting: str,
-    truth: FloatArray,
-    runs: Sequence[tuple[FloatArray, FloatArray, float, float]],
-) -> Level:
-    """A level from runs with different seeds: (values, standard errors, rays a point, seconds) of each."""
+    @property
+    def ways(self) -> tuple[Curve, ...]:
+        """All curves but those that compare sets of directions, which no bake offers."""
+        return tuple(curve for curve in self.curves if curve.kind != "directions")
+
+
+def level_of(setting: str, truth: FloatArray, runs: Sequence[Run]) -> Level:
+    """A level from runs with different seeds."""
     errors = np.stack([values - truth for values, _, _, _ in runs])
     reported = np.stack([error for _, error, _, _ in runs])
     each = np.sqrt(np.mean(np.square(errors), axis=1))

@@ -1,7 +1,9 @@
 """Sets of directions to compare with the ones that a bake uses. For studies only.
 
 Sources: M. Roberts, The unreasonable effectiveness of quasirandom sequences, 2018 (R2); I. Sobol', 1967,
-scrambled as in A. Owen, 1995; J. Hammersley, 1960; the concentric map: P. Shirley, K. Chiu, 1997.
+scrambled as in A. Owen, 1995; J. Hammersley, 1960; the concentric map: P. Shirley, K. Chiu, 1997; lattices that
+grow: R. Cools, F. Kuo, D. Nuyens, Constructing embedded lattice rules for multivariate integration, SIAM Journal on
+Scientific Computing 28, 2006.
 """
 
 from __future__ import annotations
@@ -9,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.tracing.sampling import SETS, packets_of, spiral_lattice, vogel_disc
+from aobake.tracing.sampling import SETS, packets_of, vogel_disc
 
 __all__ = ["KINDS", "compared_sets"]
 
@@ -18,6 +20,8 @@ FloatArray = NDArray[np.float64]
 RANDOM_SETS = 64  # more, for what differs from set to set without a pattern
 PLASTIC = 1.32471795724474602596
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+# Of the multipliers that keep, for 32 to 2^20 points, the largest least distance on all rings of the disc.
+MULTIPLIER = 444_633
 
 KINDS = (
     "random",
@@ -63,7 +67,7 @@ def _disc(kind: str, count: int, number: int) -> FloatArray:
                 np.stack([(k + (number + 0.5) / SETS) / count, (k * GOLDEN) % 1.0], axis=1)
             )
         case "growing spiral":
-            return spiral_lattice(k, count, number * GOLDEN % 1.0)
+            return _spiral_lattice(k, number * GOLDEN % 1.0)
     return vogel_disc(count, (number + 0.5) / SETS)
 
 
@@ -74,6 +78,13 @@ def _reversed(k: NDArray[np.int64], count: int) -> FloatArray:
         found += bit * (k & 1)
         k, count, bit = k >> 1, count >> 1, 0.5 * bit
     return found
+
+
+def _spiral_lattice(k: NDArray[np.int64], shift: float) -> FloatArray:
+    """A lattice on (radius squared, angle); the even ones of len(k), a power of two, are that of half as many."""
+    angle = 2.0 * np.pi * ((k * MULTIPLIER) % len(k)) / len(k)
+    radius = np.sqrt((k / len(k) + shift) % 1.0)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
 def _owen_sobol(count: int, rng: np.random.Generator) -> FloatArray:

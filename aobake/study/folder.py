@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import hashlib
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aobake import files
-from aobake.meshes.scene import Scene
-from aobake.settings import BakeSettings, TraceSettings
 from aobake.study.curves import Curve, Level, Study, pareto
-from aobake.study.measure import Extent
-from aobake.study.page import page, summary
-from aobake.study.pictures import LevelPictures
+from aobake.study.page import page
+from aobake.study.pictures import Picture
 from aobake.study.plots import plots
+from aobake.study.reference import Find, Kept
+from aobake.study.summary import summary
 
 __all__ = ["kept_reference", "outputs", "write_study"]
 
@@ -36,7 +34,6 @@ NAMES = (
         for kind in ("svg", "png")
     ),
 )
-VARIED = ("rays", "tolerance", "tolerance_of", "quality", "max_rays", "seed", "threads", "strict")
 
 
 def outputs(folder: Path) -> tuple[Path, ...]:
@@ -44,16 +41,11 @@ def outputs(folder: Path) -> tuple[Path, ...]:
     return tuple(folder / name for name in NAMES)
 
 
-def kept_reference(
-    folder: Path, scene: Scene, settings: BakeSettings, extent: Extent
-) -> Callable[[Callable[[], FloatArray]], FloatArray]:
-    """What gives the reference from the folder where it is kept there, and keeps it there else.
+def kept_reference(folder: Path) -> Kept:
+    """What gives a reference from the folder where it is kept there, and keeps it there else."""
 
-    It is known by a digest of the scene, the settings that matter, and how it was made.
-    """
-    path = folder / f"reference-{_digest(scene, settings, extent)[:16]}.npy"
-
-    def reference(find: Callable[[], FloatArray]) -> FloatArray:
+    def reference(digest: str, find: Find) -> FloatArray:
+        path = folder / f"reference-{digest[:16]}.npy"
         if path.is_file():
             try:
                 found = np.load(path, allow_pickle=False)
@@ -70,22 +62,13 @@ def kept_reference(
     return reference
 
 
-def _digest(scene: Scene, settings: BakeSettings, extent: Extent) -> str:
-    told = hashlib.sha256()
-    matters = {f.name for f in dataclasses.fields(TraceSettings)} - set(VARIED)
-    values = {name: getattr(settings, name) for name in sorted(matters)}
-    told.update(json.dumps([values, extent.points, extent.reference]).encode())
-    for instance, mesh in scene.placed():
-        told.update(np.ascontiguousarray(instance.transform).tobytes())
-        for array in (mesh.vertices, mesh.faces, mesh.normals):
-            told.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
-        sided = mesh.material is not None and scene.materials[mesh.material].double_sided
-        told.update(bytes([mesh.flat_shaded, sided]))
-    return told.hexdigest()
+def write_study(
+    folder: Path, study: Study, pictures: Sequence[Sequence[Picture]]
+) -> tuple[Path, ...]:
+    """Write everything, the page last, and remove plots of an earlier study that this one does not draw.
 
-
-def write_study(folder: Path, study: Study, pictures: Sequence[LevelPictures]) -> tuple[Path, ...]:
-    """Write everything, the page last. Raises OutputError."""
+    pictures : rows of them. Returns the files. Raises OutputError.
+    """
     drawings = plots(study)
     content: dict[Path, bytes] = {
         folder / "study.json": _json(study).encode(),
@@ -94,21 +77,23 @@ def write_study(folder: Path, study: Study, pictures: Sequence[LevelPictures]) -
         folder / "index.html": page(study, drawings, pictures).encode(),
     }
     files.write_files(content)
+    for path in outputs(folder):
+        if path not in content:
+            path.unlink(missing_ok=True)
     return tuple(content)
 
 
 def _json(study: Study) -> str:
-    curves = [_curve(curve) for curve in study.curves]
-    ways = [curve for curve in study.curves if curve.kind != "directions"]
     data = {
         "asset": study.asset,
+        "what": study.what,
         "points": study.points,
-        "vertices": study.vertices,
+        "whole": study.whole,
         "reference_rays": study.reference_rays,
         "summary": list(summary(study)),
-        "curves": curves,
+        "curves": [_curve(curve) for curve in study.curves],
         "surface": [_curve(curve) for curve in study.surface],
-        "pareto": [[name, level.setting] for name, level in pareto(ways)],
+        "pareto": [[name, level.setting] for name, level in pareto(study.ways)],
         "facts": dict(study.facts),
     }
     return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
@@ -122,8 +107,9 @@ def _csv(study: Study) -> str:
     stream = io.StringIO()
     fields = [field.name for field in dataclasses.fields(Level)]
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["curve", "kind", *fields])
+    writer.writerow(["curve", "kind", "denoised", *fields])
     for curve in (*study.curves, *study.surface):
         for level in curve.levels:
-            writer.writerow([curve.name, curve.kind, *(getattr(level, name) for name in fields)])
+            values = [getattr(level, name) for name in fields]
+            writer.writerow([curve.name, curve.kind, int(curve.denoised), *values])
     return stream.getvalue()

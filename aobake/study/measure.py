@@ -1,29 +1,28 @@
-"""A study: one asset, measured with every budget, every tolerance, every set of directions, and both methods."""
+"""A study of vertices: one asset with every budget, every tolerance, every set of directions, and both methods."""
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake import environment
-from aobake.errors import InputError, SettingsError
+from aobake.errors import InputError
 from aobake.meshes.scene import Scene
-from aobake.settings import QUALITIES, BakeSettings, ToleranceOf
+from aobake.settings import BakeSettings, ToleranceOf
 from aobake.study.bench import Bench, bench_of, surface_of_bench
 from aobake.study.curves import Curve, Level, Study, level_of
 from aobake.study.directions import KINDS, compared_sets
+from aobake.study.facts import facts_of, name_of_asset
+from aobake.study.reference import Kept, digest, made_anew
+from aobake.study.steps import Progress, Steps
+from aobake.study.ways import FORMS, rays_towards, refuse_longer, said, towards
 
 __all__ = ["FULL", "QUICK", "Extent", "measure", "study_extent"]
 
 FloatArray = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
-Kept = Callable[[Callable[[], FloatArray]], FloatArray]
 
 WARMING_RAYS, WARMING_POINTS = 256, 64
 
@@ -36,6 +35,8 @@ class Extent:
     budgets : fixed numbers of rays; sets : those for each set of directions
     tolerances : in each form; seeds : repeats of everything, for bands and for the times
     surface : points all over the surface, against which methods are compared; methods : their budgets
+    shown : budgets that pictures of the whole asset are made of, picture_size each; their errors are against
+        shown_reference rays
     """
 
     points: int
@@ -47,15 +48,19 @@ class Extent:
     surface: int
     surface_reference: int
     methods: tuple[int, ...]
+    shown: tuple[int, ...] = ()
+    shown_reference: int = 0
+    picture_size: str = "320x240"
 
     def rays(self, whole: int) -> float:
         """About how many rays all of it takes, for an asset with so many vertices."""
         points = min(self.points, whole)
-        curves = sum(self.budgets) + len(KINDS) * sum(self.sets)
-        curves += sum(2.0 * 0.4 * t ** (-4.0 / 3.0) for t in self.tolerances)
+        towards_them = sum(len(FORMS) * rays_towards(t) for t in self.tolerances)
+        curves = sum(self.budgets) + len(KINDS) * sum(self.sets) + towards_them
         methods = whole * 7.0 * sum(self.methods) if self.methods else 0.0
         at_points = points * (self.reference + self.seeds * curves)
-        return float(at_points + self.surface * self.surface_reference + methods)
+        pictures = whole * (self.shown_reference + sum(self.shown))
+        return float(at_points + self.surface * self.surface_reference + methods + pictures)
 
 
 TOLERANCES = (0.05, 0.02, 0.01, 0.005, 0.002)
@@ -69,6 +74,9 @@ FULL = Extent(
     surface=20_000,
     surface_reference=1024,
     methods=(16, 64, 256, 1024),
+    shown=(4, 16, 64, 256, 1024),
+    shown_reference=8192,
+    picture_size="480x360",
 )
 QUICK = Extent(
     points=1024,
@@ -80,6 +88,8 @@ QUICK = Extent(
     surface=4000,
     surface_reference=512,
     methods=(16, 64),
+    shown=(16, 64, 256),
+    shown_reference=1024,
 )
 
 
@@ -101,7 +111,7 @@ def measure(
 
     settings : of the bake; its rays, tolerance and method are what is varied
     time_limit : seconds that it may take, by an estimate before it starts; None: any
-    kept : gives the reference, from where it was kept or by calling the function that it is given
+    kept : where the reference is kept; None: it is made anew
     progress : called with (stage, done, total); whatever it raises stops the study
     Values and errors are the same on every run; seconds are not.
     Raises InputError for an asset without points to bake, SettingsError where the estimate is over the limit.
@@ -111,12 +121,13 @@ def measure(
         who = f"{scene.source.path}: " if scene.source else ""
         raise InputError(f"{who}there is no triangle to bake, so there is nothing to study.")
     _refuse_if_long(bench, extent, time_limit)
-    steps = _Steps(progress, 3 + len(KINDS) + 2 * len(extent.methods))
+    steps = Steps(progress, 3 + len(KINDS) + 2 * len(extent.methods))
     steps.next("reference")
-    truth = (kept or _made)(partial(bench.reference, extent.reference))
+    known = digest(scene, settings, (extent.points, extent.reference))
+    truth = (kept or made_anew)(known, partial(bench.reference, extent.reference))
     seeds = range(1, extent.seeds + 1)
     steps.next("budgets")
-    fixed = Curve(
+    budgets = Curve(
         name="fixed rays",
         kind="budget",
         levels=tuple(
@@ -128,31 +139,15 @@ def measure(
     tolerances = _tolerance_curves(bench, extent, truth)
     sets = tuple(_set_curve(bench, extent, truth, kind, steps) for kind in KINDS)
     return Study(
-        asset=scene.source.path.name if scene.source else "scene",
+        asset=name_of_asset(scene),
+        what="vertices",
         points=len(bench.points),
-        vertices=bench.whole,
+        whole=bench.whole,
         reference_rays=extent.reference,
-        curves=(fixed, *tolerances, *sets),
+        curves=(budgets, *tolerances, *sets),
         surface=_methods(bench, extent, steps),
-        facts=_facts(scene, extent),
+        facts=facts_of(scene, extent.seeds),
     )
-
-
-def _made(find: Callable[[], FloatArray]) -> FloatArray:
-    return find()
-
-
-class _Steps:
-    """Counts steps for a progress bar."""
-
-    def __init__(self, progress: Progress | None, total: int) -> None:
-        self._progress, self._done, self._total = progress, 0, total
-
-    def next(self, stage: str) -> None:
-        """A step begins."""
-        if self._progress is not None:
-            self._progress(stage, self._done, self._total)
-        self._done += 1
 
 
 def _refuse_if_long(bench: Bench, extent: Extent, time_limit: float | None) -> None:
@@ -166,45 +161,27 @@ def _refuse_if_long(bench: Bench, extent: Extent, time_limit: float | None) -> N
     some.run(settings)
     rate = len(some.points) * WARMING_RAYS / max(time.perf_counter() - start, 1e-6)
     expected = extent.rays(bench.whole) / rate
-    if time_limit is not None and expected > time_limit:
-        cure = ", or make a quick study" if extent.reference > QUICK.reference else ""
-        raise SettingsError(
-            f"the study would take about {expected:.0f} s on this machine, and the time limit is "
-            f"{time_limit:g} s. Raise the time limit{cure}."
-        )
+    refuse_longer(expected, time_limit, quicker=extent.reference > QUICK.reference)
 
 
 def _tolerance_curves(bench: Bench, extent: Extent, truth: FloatArray) -> tuple[Curve, ...]:
     """Each point to a tolerance, and all of them together."""
+    most = 4 * max(extent.budgets)
 
     def level(tolerance: float, form: ToleranceOf) -> Level:
         runs = [
-            bench.run(
-                replace(
-                    bench.settings,
-                    tolerance=tolerance,
-                    tolerance_of=form,
-                    quality=None,
-                    max_rays=max(extent.budgets) * 4,
-                    seed=seed,
-                )
-            )
+            bench.run(towards(bench.settings, tolerance, form, most, seed))
             for seed in range(1, extent.seeds + 1)
         ]
-        names = {value: f" ({name})" for name, value in QUALITIES.items()}
-        said = (
-            f"{tolerance:g}{names.get(tolerance, '')}" if form == "each" else f"rms:{tolerance:g}"
-        )
-        return level_of(said, truth, runs)
+        return level_of(said(tolerance, form), truth, runs)
 
-    forms: tuple[tuple[str, ToleranceOf], ...] = (("tolerance", "each"), ("tolerance rms", "rms"))
     return tuple(
         Curve(name=name, kind="tolerance", levels=tuple(level(t, form) for t in extent.tolerances))
-        for name, form in forms
+        for name, form in FORMS
     )
 
 
-def _set_curve(bench: Bench, extent: Extent, truth: FloatArray, kind: str, steps: _Steps) -> Curve:
+def _set_curve(bench: Bench, extent: Extent, truth: FloatArray, kind: str, steps: Steps) -> Curve:
     """One set of directions at several sizes."""
     steps.next(f"{kind} directions")
     levels = []
@@ -215,7 +192,7 @@ def _set_curve(bench: Bench, extent: Extent, truth: FloatArray, kind: str, steps
     return Curve(name=kind, kind="directions", levels=tuple(levels))
 
 
-def _methods(bench: Bench, extent: Extent, steps: _Steps) -> tuple[Curve, ...]:
+def _methods(bench: Bench, extent: Extent, steps: Steps) -> tuple[Curve, ...]:
     """Point sampling and least squares, against a dense bake of the surface between the vertices."""
     surface = surface_of_bench(bench, extent.surface, extent.surface_reference)
     if surface is None:
@@ -229,16 +206,3 @@ def _methods(bench: Bench, extent: Extent, steps: _Steps) -> tuple[Curve, ...]:
             levels.append(level_of(str(rays), surface.truth, [run]))
         curves.append(Curve(name=name, kind="method", levels=tuple(levels)))
     return tuple(curves)
-
-
-def _facts(scene: Scene, extent: Extent) -> dict[str, object]:
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-    return {
-        "triangles": scene.triangles,
-        "instances": len(scene.instances),
-        "seeds": extent.seeds,
-        "versions": environment.versions(),
-        "machine": environment.machine(),
-        "processors": environment.processors(),
-        "load": load,
-    }

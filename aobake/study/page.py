@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.study.curves import Curve, Level, Study, needed, pareto
-from aobake.study.pictures import LevelPictures
+from aobake.study.pictures import ERROR_SHOWN, Picture
 from aobake.study.plots import picture_png
+from aobake.study.summary import summary
 
-__all__ = ["page", "summary"]
+__all__ = ["page"]
 
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
@@ -21,44 +22,23 @@ h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .15rem .8rem .15rem 0; text-align: right; border-bottom: 1px solid #eee; }
 th:first-child, td:first-child, .facts td { text-align: left; }
-svg { max-width: 100%; height: auto; } figure { display: inline-block; margin: .3rem; }
+svg { max-width: 100%; height: auto; }
+.row { display: flex; gap: .6rem; } figure { margin: 0 0 .6rem; } img { width: 100%; height: auto; }
 figcaption { font-size: .85rem; color: #555; } .lead { font-size: 1.1rem; }
 """
 
 
-def summary(study: Study) -> tuple[str, str]:
-    """Two lines for a terminal: what an error of 0.01 costs and how that grows; what qualities cost."""
-    fixed = study.fixed
-    at = needed(fixed, 0.01)
-    if at is None:
-        first = "RMSE 0.01 is outside of what was measured"
-    else:
-        first = f"for RMSE 0.01: {at[0]:.0f} rays, {at[1]:.2g} s"
-    if fixed.slope is not None:
-        first += f"; each halving of the error costs {2.0 ** (-1.0 / fixed.slope):.1f}x"
-    named = [
-        (level.setting.partition("(")[2].rstrip(")"), level)
-        for curve in study.curves
-        for level in curve.levels
-        if "(" in level.setting
-    ]
-    told = [f"{name} {v.rays:.0f} rays, {v.seconds:.2g} s, RMSE {v.rmse:.4f}" for name, v in named]
-    return first, "quality: " + "; ".join(told)
-
-
-def page(study: Study, drawings: Mapping[str, bytes], pictures: Sequence[LevelPictures]) -> str:
+def page(study: Study, drawings: Mapping[str, bytes], pictures: Sequence[Sequence[Picture]]) -> str:
     """The page as text.
 
-    drawings : of plots.plots
+    drawings : of plots.plots; pictures : rows of them
     """
     first, second = summary(study)
     name = html.escape(study.asset)
-    points = f"{study.points:,} of its {study.vertices:,} vertices"
     parts = [
         f"<h1>What accuracy costs on {name}</h1>",
         f'<p class="lead">{html.escape(first)}.<br>{html.escape(second)}.</p>',
-        f"<p>Errors are differences from {study.reference_rays:,} rays, at {points}. Seconds are those of "
-        "tracing the whole asset, medians of repeats with different seeds.</p>",
+        f"<p>{html.escape(_measured(study))}</p>",
         _section(
             "Error over rays",
             drawings["error-rays.svg"],
@@ -66,18 +46,11 @@ def page(study: Study, drawings: Mapping[str, bytes], pictures: Sequence[LevelPi
             "point to the same error, or (rms) where a ray takes away most. Rings mark the Pareto front.",
         ),
         _section("Error over time", drawings["error-time.svg"], "The same, by the clock."),
-        _table([curve for curve in study.curves if curve.kind != "directions"]),
-        _section(
-            "Is the reported error honest?",
-            drawings["honesty.svg"],
-            "The standard error that a bake reports against the true one; on the line they agree.",
-        ),
-        _section(
-            "Sets of directions",
-            drawings["directions.svg"],
-            "How directions are chosen, at equal rays. Bakes use the Vogel spiral for a fixed number, and the "
-            "growing spiral towards a tolerance.",
-        ),
+        _denoiser(study),
+        "<h2>All levels</h2>",
+        _table(study.ways),
+        _section("Is the reported error honest?", drawings["honesty.svg"], _honesty(study)),
+        _directions(drawings) if study.what == "vertices" else "",
         _methods(study, drawings),
         _pictures(pictures),
         _facts(study),
@@ -86,6 +59,65 @@ def page(study: Study, drawings: Mapping[str, bytes], pictures: Sequence[LevelPi
     return (
         f'<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>{name}: accuracy and time</title>'
         f"<style>{STYLE}</style>\n{body}\n</html>\n"
+    )
+
+
+def _measured(study: Study) -> str:
+    """What errors and seconds mean here."""
+    against = f"Errors are differences from {study.reference_rays:,} rays"
+    if study.what == "vertices":
+        return (
+            f"{against}, at {study.points:,} of its {study.whole:,} vertices. Seconds are those of tracing the "
+            "whole asset, medians of repeats with different seeds."
+        )
+    return (
+        f"{against} a texel without denoising, at the {study.points:,} texels of a texture of "
+        f"{study.facts['texture']} that surfaces lie on, before rims are lit and seams joined. Seconds are those "
+        "of texels, rays, denoising, rims, seams and gutters, medians of repeats with different seeds; what is "
+        "done once for an asset, as unwrapping, is not in them."
+    )
+
+
+def _honesty(study: Study) -> str:
+    """What the plot of reported over true errors shows."""
+    text = "The standard error that a bake reports against the true one; on the line they agree."
+    if study.denoised is not None:
+        text += " That of a denoised bake is the one of its rays: what the denoiser takes away comes on top."
+    return text
+
+
+def _denoiser(study: Study) -> str:
+    """What the denoiser is worth at each number of rays; why it was not compared, for texels without."""
+    if study.what != "texels":
+        return ""
+    title = "<h2>What denoising is worth</h2>\n"
+    if study.denoised is None:
+        return f"{title}<p>It was not measured: {html.escape(str(study.facts['denoiser']))}.</p>"
+    rows = [
+        "<tr><th>rays</th><th>RMSE</th><th>denoised</th><th>ratio</th><th>rays for it without</th>"
+        "<th>seconds</th><th>denoised</th></tr>"
+    ]
+    for plain, smooth in zip(study.fixed.levels, study.denoised.levels, strict=True):
+        same = needed(study.fixed, smooth.rmse)
+        ratio = smooth.rmse / plain.rmse if plain.rmse > 0.0 else 1.0
+        rows.append(
+            f"<tr><td>{plain.setting}</td><td>{plain.rmse:.5f}</td><td>{smooth.rmse:.5f}</td>"
+            f"<td>{ratio:.2f}</td><td>{'' if same is None else f'{same[0]:.0f}'}</td>"
+            f"<td>{plain.seconds:.2f}</td><td>{smooth.seconds:.2f}</td></tr>"
+        )
+    text = (
+        "The same rays with and without it. It moves no value by more than twice its standard error, so that it "
+        "changes ever less as rays grow in number. Where the ratio nears 1 it costs its seconds for nothing."
+    )
+    return f"{title}<p>{text}</p>\n<table>" + "\n".join(rows) + "</table>"
+
+
+def _directions(drawings: Mapping[str, bytes]) -> str:
+    return _section(
+        "Sets of directions",
+        drawings["directions.svg"],
+        "How directions are chosen, at equal rays. Bakes use the Vogel spiral for a fixed number, and the "
+        "growing spiral towards a tolerance.",
     )
 
 
@@ -112,7 +144,9 @@ def _table(curves: Sequence[Curve]) -> str:
 
 def _said(curve: Curve, level: Level) -> str:
     """What was asked for; a tolerance says its form by itself."""
-    return f"{curve.kind if curve.kind == 'tolerance' else curve.name} {level.setting}"
+    if curve.kind != "tolerance":
+        return f"{curve.name} {level.setting}"
+    return f"tolerance {level.setting}" + (", denoised" if curve.denoised else "")
 
 
 def _methods(study: Study, drawings: Mapping[str, bytes]) -> str:
@@ -126,17 +160,21 @@ def _methods(study: Study, drawings: Mapping[str, bytes]) -> str:
     )
 
 
-def _pictures(pictures: Sequence[LevelPictures]) -> str:
-    if not pictures:
+def _pictures(rows: Sequence[Sequence[Picture]]) -> str:
+    if not rows:
         return ""
     figures = [
-        f"<div><figure>{_image(level.occlusion, f'{level.rays} rays')}"
-        f"<figcaption>{level.rays:,} rays</figcaption></figure>"
-        f"<figure>{_image(level.error, f'error of {level.rays} rays')}"
-        "<figcaption>its error; dark red: 0.05 and more</figcaption></figure></div>"
-        for level in pictures
+        '<div class="row">'
+        + "".join(
+            f"<figure>{_image(picture.pixels, picture.caption)}"
+            f"<figcaption>{html.escape(picture.caption)}</figcaption></figure>"
+            for picture in row
+        )
+        + "</div>"
+        for row in rows
     ]
-    return "<h2>How it looks</h2>\n" + "\n".join(figures)
+    text = f"<p>Errors from white, exact, to dark red, {ERROR_SHOWN:g} and more.</p>\n"
+    return "<h2>How it looks</h2>\n" + text + "\n".join(figures)
 
 
 def _image(pixels: NDArray[np.float32], alt: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +13,9 @@ from aobake.render_settings import RenderSettings
 from aobake.settings import BakeSettings
 from aobake.shading.materials import Baked
 from aobake.shading.preview import render
+from aobake.study.measure import Extent
 
-__all__ = ["LevelPictures", "level_pictures"]
+__all__ = ["ERROR_SHOWN", "Picture", "heat", "level_pictures"]
 
 Float32Array = NDArray[np.float32]
 
@@ -25,32 +25,37 @@ DARKEST = np.array([0.65, 0.05, 0.1])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LevelPictures:
-    """rays : a point; occlusion, error : (H, W, 3) float32 in [0, 1], as a display takes them."""
+class Picture:
+    """caption : one line; pixels : (H, W, 3) float32 in [0, 1], as a display takes them."""
 
-    rays: int
-    occlusion: Float32Array
-    error: Float32Array
+    caption: str
+    pixels: Float32Array
 
 
 def level_pictures(
-    scene: Scene, settings: BakeSettings, budgets: Sequence[int], reference: int, size: str
-) -> tuple[LevelPictures, ...]:
-    """Pictures at each of the budgets.
+    scene: Scene, settings: BakeSettings, extent: Extent
+) -> tuple[tuple[Picture, ...], ...]:
+    """For each of the budgets the asset, baked to its vertices, and the error.
 
-    reference : rays of the bake that the errors in the maps are measured against
-    size : of each picture, such as 320x240
+    extent : which budgets, what their errors are measured against, and how large pictures are
     """
-    exact = _baked(scene, settings, reference, 1)
+    if not extent.shown:
+        return ()
+    exact, size = _baked(scene, settings, extent.shown_reference, 1), extent.picture_size
     shown = []
-    for rays in budgets:
+    for rays in extent.shown:
         found = _baked(scene, settings, rays, 2)
         wrong = [np.abs(a - b) for a, b in zip(found, exact, strict=True)]
         shown.append(
-            LevelPictures(
-                rays=rays,
-                occlusion=_grey(scene, settings, found, size),
-                error=_heat(scene, settings, wrong, size),
+            (
+                Picture(
+                    caption=f"{rays:,} rays",
+                    pixels=_grey(*_rendered(scene, settings, found, size)),
+                ),
+                Picture(
+                    caption="its error",
+                    pixels=heat(_rendered(scene, settings, wrong, size)[0]),
+                ),
             )
         )
     return tuple(shown)
@@ -72,18 +77,12 @@ def _rendered(
     return pixels[..., 0], pixels[..., 3:]
 
 
-def _grey(
-    scene: Scene, settings: BakeSettings, values: list[Float32Array], size: str
-) -> Float32Array:
-    found, cover = _rendered(scene, settings, values, size)
+def _grey(found: Float32Array, cover: Float32Array) -> Float32Array:
     shade = np.clip(found, 0.0, 1.0)[..., None] + BACKGROUND * (1.0 - cover)
     return np.repeat(shade, 3, axis=2).astype(np.float32)
 
 
-def _heat(
-    scene: Scene, settings: BakeSettings, values: list[Float32Array], size: str
-) -> Float32Array:
-    """From white, exact, to dark red."""
-    found, _ = _rendered(scene, settings, values, size)
-    strength = np.sqrt(np.clip(found / ERROR_SHOWN, 0.0, 1.0))[..., None]
+def heat(error: Float32Array) -> Float32Array:
+    """(..., 3) colours of errors (...): from white, exact, to dark red, ERROR_SHOWN and more."""
+    strength = np.sqrt(np.clip(error / ERROR_SHOWN, 0.0, 1.0))[..., None]
     return np.asarray(1.0 - strength * (1.0 - DARKEST), np.float32)

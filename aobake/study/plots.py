@@ -48,17 +48,19 @@ def plots(study: Study) -> dict[str, bytes]:
     check_plots()
     import matplotlib as mpl
 
-    ways = [curve for curve in study.curves if curve.kind != "directions"]
+    ways = study.ways
     sets = [curve for curve in study.curves if curve.kind == "directions"]
     found: dict[str, bytes] = {}
     with mpl.rc_context(STYLE):
-        for name, figure in (
-            ("error-rays", _curves(ways, "rays", "rays per point", study)),
-            ("error-time", _curves(ways, "seconds", "seconds of tracing", study)),
-            ("directions", _curves(sets, "rays", "rays per point")),
-            ("methods", _curves(study.surface, "rays", "rays per vertex")),
-            ("honesty", _honesty(ways)),
-        ):
+        figures = {
+            "error-rays": _curves(ways, "rays", "rays per point", study),
+            "error-time": _curves(ways, "seconds", "seconds", study),
+            "honesty": _honesty(ways),
+        }
+        if study.what == "vertices":
+            figures["directions"] = _curves(sets, "rays", "rays per point")
+            figures["methods"] = _curves(study.surface, "rays", "rays per vertex")
+        for name, figure in figures.items():
             for kind in ("svg", "png"):
                 found[f"{name}.{kind}"] = _bytes(figure, kind)
     return found
@@ -105,7 +107,8 @@ def _curves(
         x = [getattr(level, measure) for level in curve.levels]
         slope = "" if curve.slope is None else f", slope {curve.slope:.2f}"
         y = [level.rmse for level in curve.levels]
-        axes.plot(x, y, "o-", color=color, ms=3.5, lw=1.4, label=f"{curve.name}{slope}")
+        line = "o--" if curve.denoised else "o-"
+        axes.plot(x, y, line, color=color, ms=3.5, lw=1.4, label=f"{curve.name}{slope}")
         low = [level.rmse_least for level in curve.levels]
         high = [level.rmse_most for level in curve.levels]
         axes.fill_between(x, low, high, color=color, alpha=0.2, lw=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -40,15 +41,43 @@ def test_a_limit_that_is_too_short_is_said_before_the_study_starts(
     assert one_line(done.err, "would take about", "quick")
     assert not (tmp_path / "new").exists()
     assert run("study", corner, "-o", tmp_path / "new", "--time-limit", "-1").status == 2
+    done = run("study", corner, "-o", tmp_path / "new", "--texture", "--time-limit", "0.001")
+    assert done.status == 2
+    assert one_line(done.err, "would take about", "quick")
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_texture_is_studied_at_a_size_of_its_own(run: Run, corner: Path, tmp_path: Path) -> None:
+    (tmp_path / "aobake.toml").write_text("size = 8192\ndenoise = 'off'\n", encoding="ascii")
+    asked = ("study", corner, "-o", tmp_path / "study", "--quick", "--texture")
+    done = run(*asked, "--size", 32)
+    assert done.status == 0, done.err
+    lines = done.out.splitlines()
+    assert len(lines) == 2
+    assert lines[0].startswith("for RMSE 0.01: ")
+    assert lines[1].startswith("quality: draft ")
+    told = json.loads((tmp_path / "study" / "study.json").read_text(encoding="utf-8"))
+    assert told["facts"]["texture"] == "32 x 32"
+    page = (tmp_path / "study" / "index.html").read_text(encoding="utf-8")
+    assert "It was not measured: denoise is off." in page
+    assert run(*asked, "--force", "--size", 0).status == 2
+
+
+def test_a_size_without_a_texture_is_refused(run: Run, corner: Path, tmp_path: Path) -> None:
+    done = run("study", corner, "-o", tmp_path / "new", "--size", 64)
+    assert done.status == 2
+    assert one_line(done.err, "--size", "--texture")
+    assert not (tmp_path / "new").exists()
 
 
 def test_points_without_faces_are_refused(run: Run, tmp_path: Path) -> None:
     asset = tmp_path / "points.obj"
     asset.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n", encoding="ascii")
-    done = run("study", asset, "-o", tmp_path / "new", "--quick")
-    assert done.status == 1
-    assert one_line(done.err, "triangle")
-    assert not (tmp_path / "new").exists()
+    for more in ((), ("--texture",)):
+        done = run("study", asset, "-o", tmp_path / "new", "--quick", *more)
+        assert done.status == 1
+        assert one_line(done.err, "triangle")
+        assert not (tmp_path / "new").exists()
 
 
 def test_the_command_is_listed_and_quick_is_smaller() -> None:
