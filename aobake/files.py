@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -13,17 +14,23 @@ from aobake.errors import InputError, OutputError
 
 __all__ = [
     "PART",
+    "UNFINISHED",
     "Content",
     "check_writable",
+    "is_unfinished",
+    "make_folder",
     "read_bytes",
     "same_file",
     "sha256",
     "write_files",
 ]
 
-# How the names of files begin that are not complete yet; they end in ".part". It differs from process to
-# process, on one machine or several, so that what a killed one left can be told from its neighbours' work.
-PART = f".aobake-{os.urandom(4).hex()}-"
+# How the names of all files begin that are not complete yet. They end in ".part", with eight characters before.
+UNFINISHED = ".aobake-"
+# The same of this process. It differs from one to the next, on one machine or several, so that what a killed one
+# left can be told from its neighbours' work.
+PART = f"{UNFINISHED}{os.urandom(4).hex()}-"
+_UNFINISHED = re.compile(re.escape(UNFINISHED) + r"([0-9a-f]{8}-)?[0-9a-z_]{8}\.part")
 
 Content = bytes | bytearray | memoryview | Iterable[bytes | bytearray | memoryview]
 
@@ -62,6 +69,27 @@ def same_file(a: Path, b: Path) -> bool:
         return a.samefile(b)
     except OSError:
         return False
+
+
+def is_unfinished(name: str) -> bool:
+    """Whether this is the name, without folders, of a file of ours that is not complete, and of no other."""
+    return _UNFINISHED.fullmatch(name) is not None
+
+
+def make_folder(path: Path, needed_by: str | None = None) -> bool:
+    """Make a folder, and those above it, unless it is there; whether it was made.
+
+    needed_by : the file that goes there, named first in the message.
+    Raises OutputError.
+    """
+    try:
+        path.mkdir(parents=True)
+    except OSError as error:
+        if path.is_dir():
+            return False
+        who = f"{needed_by}: its folder {path}" if needed_by else f"{path}: this folder"
+        raise OutputError(f"{who} cannot be made ({error.strerror or error}).") from error
+    return True
 
 
 def check_writable(path: Path) -> None:

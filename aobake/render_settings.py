@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from aobake.errors import SettingsError, nearest
+from aobake.checks import check_between, check_choice, check_flag, check_whole
+from aobake.errors import SettingsError
 from aobake.settings import GroundAxis
 
 __all__ = [
@@ -127,13 +127,11 @@ class RenderSettings:
     def __post_init__(self) -> None:
         _check_picture(self)
         _check_light(self)
-        _choice("channel", self.channel, get_args(Channel))
-        _choice("tone", self.tone, get_args(Tone))
-        _choice("ao", self.ao, get_args(OcclusionChoice))
+        check_choice("channel", self.channel, get_args(Channel))
+        check_choice("tone", self.tone, get_args(Tone))
+        check_choice("ao", self.ao, get_args(OcclusionChoice))
         for name in ("no_shadows", "multi_bounce"):
-            value = getattr(self, name)
-            if not isinstance(value, bool):
-                raise SettingsError(f"{name} is {value!r}; True or False is needed.")
+            check_flag(name, getattr(self, name))
         if self.background not in get_args(Background) and not HEX_COLOR.fullmatch(
             str(self.background)
         ):
@@ -149,33 +147,27 @@ def _check_picture(settings: RenderSettings) -> None:
             f"size is {settings.size!r}; width x height in pixels is needed, such as 1280x720, "
             f"each from 1 to {MOST_PIXELS_PER_SIDE}."
         )
-    samples = settings.samples
-    if isinstance(samples, bool) or not hasattr(samples, "__index__"):
-        raise SettingsError(f"samples is {samples!r}; a whole number is needed.")
-    if not 1 <= samples <= LARGEST_SAMPLES:
-        raise SettingsError(
-            f"samples is {samples!r}; a whole number from 1 to {LARGEST_SAMPLES} is needed."
-        )
+    check_whole("samples", settings.samples, 1, LARGEST_SAMPLES)
     if settings.view is not None:
         _, elevation = numbers_of("view", settings.view)
         if not -90.0 <= elevation <= 90.0:
             raise SettingsError(
                 f"view is {settings.view!r}; an elevation from -90 to 90 is needed."
             )
-    _between("fov", settings.fov, 1.0, 170.0)
+    check_between("fov", settings.fov, 1.0, 170.0)
     if settings.up is not None:
-        _choice("up", settings.up, get_args(GroundAxis))
+        check_choice("up", settings.up, get_args(GroundAxis))
     if not str(settings.camera):
         raise SettingsError("camera is ''; auto, frame, a name or a number is needed.")
 
 
 def _check_light(settings: RenderSettings) -> None:
-    _choice("lights", settings.lights, get_args(Lights))
-    _between("key", settings.key, 0.0, 1e6)
-    _between("ambient", settings.ambient, 0.0, 1e6)
-    _between("exposure", settings.exposure, -32.0, 32.0)
+    check_choice("lights", settings.lights, get_args(Lights))
+    check_between("key", settings.key, 0.0, 1e6)
+    check_between("ambient", settings.ambient, 0.0, 1e6)
+    check_between("exposure", settings.exposure, -32.0, 32.0)
     if settings.ks is not None:
-        _between("ks", settings.ks, 0.0, 1.0)
+        check_between("ks", settings.ks, 0.0, 1.0)
 
 
 def numbers_of(name: str, text: str) -> tuple[float, float]:
@@ -199,17 +191,3 @@ def color_of(text: str) -> tuple[float, float, float]:
     """Red, green and blue in [0, 1], as displays take them, of a colour such as #ff8000."""
     red, green, blue = (int(text[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
     return red, green, blue
-
-
-def _between(name: str, value: object, least: float, most: float) -> None:
-    if (
-        isinstance(value, bool)
-        or not hasattr(value, "__float__")
-        or not least <= float(value) <= most
-    ):
-        raise SettingsError(f"{name} is {value!r}; a number from {least:g} to {most:g} is needed.")
-
-
-def _choice(name: str, value: object, known: Collection[str]) -> None:
-    if value not in known:
-        raise SettingsError(f"{name} is {value!r}.{nearest(value, known)}")

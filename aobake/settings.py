@@ -5,11 +5,19 @@ The docstring below each field is its help text, in the API reference and on the
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
+from aobake.checks import (
+    check_choice,
+    check_flag,
+    check_positive,
+    check_real,
+    check_whole,
+    check_words,
+    is_number,
+)
 from aobake.errors import SettingsError, nearest
 from aobake.overrides import forced, switched
 
@@ -62,7 +70,7 @@ MOST_RAYS = (
 )  # a direction set of this size takes 12 MiB; the error is below 1e-5 long before
 
 
-FIRST_ROUND = 32  # rays of the first round towards a tolerance; they grow by powers of two
+FIRST_ROUND = 32  # the least that max_rays may be: fewer rays hardly tell their error
 QUALITIES: Mapping[Quality, float] = {"draft": 0.02, "normal": 0.005, "final": 0.002}
 
 MOST_TEXELS_PER_SIDE = 32768
@@ -83,7 +91,7 @@ class TraceSettings:
     """What has to reach the tolerance: each point, or the rms of all points; rms:E says both at once."""
 
     quality: Quality | None = None
-    """A tolerance by name: draft (0.02), normal (0.005) or final (0.002), which take 100, 580 and 1,850 rays
+    """A tolerance by name: draft (0.02), normal (0.005) or final (0.002), which take 80, 490 and 1,550 rays
     a vertex on the demo scene. A tolerance that is given as well has the last word. None: as rays and
     tolerance say."""
 
@@ -143,32 +151,30 @@ class TraceSettings:
     """Edges around the largest hole that repair closes."""
 
     def __post_init__(self) -> None:
-        _whole("rays", self.rays, 1, MOST_RAYS)
-        _whole("max_rays", self.max_rays, 1, MOST_RAYS)
+        check_whole("rays", self.rays, 1, MOST_RAYS)
+        check_whole("max_rays", self.max_rays, 1, MOST_RAYS)
         self._settle_tolerance()
-        _whole("seed", self.seed, 0, 2**64 - 1)
+        check_whole("seed", self.seed, 0, 2**64 - 1)
         if self.threads is not None:
-            _whole("threads", self.threads, 1, 4096)
+            check_whole("threads", self.threads, 1, 4096)
         self._settle_max_distance()
-        _choice("falloff", self.falloff, get_args(Falloff))
-        _choice("backfaces", self.backfaces, get_args(Backfaces))
+        check_choice("falloff", self.falloff, get_args(Falloff))
+        check_choice("backfaces", self.backfaces, get_args(Backfaces))
         if self.ground is not None:
-            _choice("ground", self.ground, get_args(GroundAxis))
-        _choice("distribution", self.distribution, get_args(Distribution))
-        _real("spread", self.spread)
-        if not 0.0 < self.spread <= 180.0:
+            check_choice("ground", self.ground, get_args(GroundAxis))
+        check_choice("distribution", self.distribution, get_args(Distribution))
+        if not 0.0 < check_real("spread", self.spread) <= 180.0:
             raise SettingsError(
                 f"spread is {self.spread!r}; an angle above 0 and up to 180 is needed."
             )
         for name in ("occluders", "exclude", "effect"):
-            object.__setattr__(self, name, _words(name, getattr(self, name)))
+            object.__setattr__(self, name, check_words(name, getattr(self, name)))
         if not self.occluders:
             raise SettingsError(f"occluders is {self.occluders!r}; all, own or names are needed.")
         forced(self.effect)
-        _whole("max_hole", self.max_hole, 3, 1_000_000)
+        check_whole("max_hole", self.max_hole, 3, 1_000_000)
         for name in ("strict", "repair", "bent_normals", "mean_distance"):
-            if not isinstance(getattr(self, name), bool):
-                raise SettingsError(f"{name} is {getattr(self, name)!r}; True or False is needed.")
+            check_flag(name, getattr(self, name))
         if self.falloff != "none" and self.max_distance is None:
             raise SettingsError(
                 f"falloff is {self.falloff!r}, but nothing says where it ends: give max_distance as well."
@@ -186,36 +192,34 @@ class TraceSettings:
             return
         number = given
         if isinstance(given, str):
-            number = float(given[:-1]) if given.endswith("%") and _is_number(given[:-1]) else given
-        _real("max_distance", number)
-        if not float(number) > 0.0:  # type: ignore[arg-type]
+            number = float(given[:-1]) if given.endswith("%") and is_number(given[:-1]) else given
+        if not check_real("max_distance", number) > 0.0:
             raise SettingsError(
                 f"max_distance is {given!r}; a length above 0 is needed (None: no limit)."
             )
 
     def _settle_tolerance(self) -> None:
         """Take 'rms:0.01' apart, and a quality for its tolerance."""
-        _choice("tolerance_of", self.tolerance_of, get_args(ToleranceOf))
+        check_choice("tolerance_of", self.tolerance_of, get_args(ToleranceOf))
         given: object = self.tolerance
         if isinstance(given, str):
             word, _, number = given.partition(":")
-            if word != "rms" or not _is_number(number):
+            if word != "rms" or not is_number(number):
                 raise SettingsError(f"tolerance is {given!r}; a number is needed, or rms:0.01.")
             given = float(number)
             object.__setattr__(self, "tolerance_of", "rms")
         if self.quality is not None:
-            _choice("quality", self.quality, get_args(Quality))
+            check_choice("quality", self.quality, get_args(Quality))
             given = QUALITIES[self.quality] if given is None else given
         if given is not None:
-            _real("tolerance", given)
-            if not 0.0 < float(given) <= 0.5:  # type: ignore[arg-type]
+            if not 0.0 < check_real("tolerance", given) <= 0.5:
                 raise SettingsError(
                     f"tolerance is {given!r}; a standard error above 0 and up to 0.5 is needed."
                 )
             if self.max_rays < FIRST_ROUND:
                 raise SettingsError(
-                    f"max_rays is {self.max_rays!r}; towards a tolerance the first round alone has "
-                    f"{FIRST_ROUND} rays: give at least that, or rays instead of a tolerance."
+                    f"max_rays is {self.max_rays!r}; a tolerance needs room for {FIRST_ROUND} rays at a "
+                    "point: give at least that, or rays instead of a tolerance."
                 )
         object.__setattr__(self, "tolerance", given)
 
@@ -229,7 +233,7 @@ class VertexSettings:
     samples inside the triangles, which is closer to the truth where triangles are large; auto chooses."""
 
     def __post_init__(self) -> None:
-        _choice("method", self.method, get_args(Method))
+        check_choice("method", self.method, get_args(Method))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -281,20 +285,19 @@ class AtlasSettings:
                 f"uv is {self.uv!r}; a number is needed, or a word.{nearest(str(self.uv), UV_CHOICES)}"
             )
         object.__setattr__(self, "uv", str(self.uv))
-        _choice("atlas", self.atlas, get_args(AtlasScope))
-        _whole("size", self.size, 1, MOST_TEXELS_PER_SIDE)
+        check_choice("atlas", self.atlas, get_args(AtlasScope))
+        check_whole("size", self.size, 1, MOST_TEXELS_PER_SIDE)
         if self.padding is not None:
-            _whole("padding", self.padding, 0, 1024)
+            check_whole("padding", self.padding, 0, 1024)
         if self.texels_per_unit is not None:
-            _positive("texels_per_unit", self.texels_per_unit)
-        _positive("unwrap_timeout", self.unwrap_timeout)
+            check_positive("texels_per_unit", self.texels_per_unit)
+        check_positive("unwrap_timeout", self.unwrap_timeout)
         if self.supersample not in SUPERSAMPLES:
             raise SettingsError(f"supersample is {self.supersample!r}; 1, 2 or 4 is needed.")
-        if not isinstance(self.normal_map, bool):
-            raise SettingsError(f"normal_map is {self.normal_map!r}; True or False is needed.")
-        _choice("denoise", self.denoise, get_args(Denoise))
-        _choice("blend", self.blend, get_args(Blend))
-        _choice("bent_space", self.bent_space, get_args(BentSpace))
+        check_flag("normal_map", self.normal_map)
+        check_choice("denoise", self.denoise, get_args(Denoise))
+        check_choice("blend", self.blend, get_args(Blend))
+        check_choice("bent_space", self.bent_space, get_args(BentSpace))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -331,7 +334,7 @@ class StoreSettings:
     place takes the next one that it has, and a warning says so."""
 
     def __post_init__(self) -> None:
-        _choice("store", self.store, get_args(Store))
+        check_choice("store", self.store, get_args(Store))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -348,50 +351,5 @@ class ImageSettings:
 
     def __post_init__(self) -> None:
         if self.encoding is not None:
-            _choice("encoding", self.encoding, get_args(Encoding))
-        _choice("pack", self.pack, get_args(Pack))
-
-
-def _whole(name: str, value: object, least: int, most: int) -> None:
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise SettingsError(f"{name} is {value!r}; a whole number is needed.")
-    if not least <= value.__index__() <= most:
-        raise SettingsError(
-            f"{name} is {value!r}; a whole number from {least} to {most} is needed."
-        )
-
-
-def _real(name: str, value: object) -> None:
-    if (
-        isinstance(value, bool)
-        or not hasattr(value, "__float__")
-        or not math.isfinite(float(value))
-    ):
-        raise SettingsError(f"{name} is {value!r}; a finite number is needed.")
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _positive(name: str, value: object) -> None:
-    _real(name, value)
-    if not float(value) > 0.0:  # type: ignore[arg-type]
-        raise SettingsError(f"{name} is {value!r}; a number above 0 is needed.")
-
-
-def _words(name: str, given: object) -> tuple[str, ...]:
-    """One word, or several."""
-    several = [given] if isinstance(given, str) else given
-    if not isinstance(several, list | tuple) or not all(isinstance(word, str) for word in several):
-        raise SettingsError(f"{name} is {given!r}; words are needed.")
-    return tuple(several)
-
-
-def _choice(name: str, value: object, known: Collection[str]) -> None:
-    if value not in known:
-        raise SettingsError(f"{name} is {value!r}.{nearest(value, known)}")
+            check_choice("encoding", self.encoding, get_args(Encoding))
+        check_choice("pack", self.pack, get_args(Pack))

@@ -10,22 +10,18 @@ from numpy.typing import ArrayLike, NDArray
 from aobake.images import encode
 from aobake.meshes.scene import Attribute, Camera, Image, Instance, Light, Material, Mesh, Scene
 from aobake.render_settings import RenderSettings
-from tests.scenes import Triangles, patch
+from aobake.shading.preview import Preview
+from tests.scenes import Triangles, affine, floor
 
 Float32Array = NDArray[np.float32]
 
 DIM = RenderSettings(size="32x32", samples=4, lights="none", ambient=1.0)  # ambient light alone
-
-
-def mesh(triangles: Triangles, **more: object) -> Mesh:
-    """A mesh with whatever else is given."""
-    return Mesh(vertices=triangles.vertices, faces=triangles.faces, **more)  # type: ignore[arg-type]
+BEAUTY = dataclasses.replace(DIM, lights="auto", ambient=0.25)
 
 
 def looking_down_z(height: float = 2.0, **more: object) -> Camera:
     """An orthographic camera at z = 10 that sees [-height/2, height/2] along y."""
-    place = np.eye(4)
-    place[2, 3] = 10.0
+    place = affine(1.0, (0.0, 0.0, 10.0))
     return Camera(transform=place, yfov_rad=None, height=height, **more)  # type: ignore[arg-type]
 
 
@@ -47,8 +43,7 @@ def scene_of(*meshes: Mesh, materials: tuple[Material, ...] = (), **more: object
 
 def card(z: float = 0.0, half: float = 1.0) -> Triangles:
     """A square that faces +z."""
-    x = half
-    return patch((-x, -x, z), (x, -x, z), (x, x, z), (-x, x, z))
+    return floor(half, z)
 
 
 CARD_UV = np.array([(0.0, 1.0), (0.0, 0.0), (1.0, 1.0), (1.0, 0.0)])  # of card's vertices
@@ -64,3 +59,14 @@ def image(pixels: ArrayLike, name: str = "image") -> Image:
     """A PNG in memory."""
     data = encode(np.asarray(pixels, np.float32), "png", "8")
     return Image(name=name, data=lambda: data)
+
+
+def middle(preview: Preview) -> Float32Array:
+    """(4,) the pixel in the middle."""
+    height, width = preview.pixels.shape[:2]
+    return np.asarray(preview.pixels[height // 2, width // 2])
+
+
+def one_sun(towards: tuple[float, float, float]) -> tuple[Light, ...]:
+    """The lights of a scene that the sun alone shines on."""
+    return (sunlight(towards),)

@@ -8,12 +8,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from aobake import Mesh
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
 ORIGIN = np.zeros(3)
 UP = np.array([0.0, 0.0, 1.0])
 FAR = 1e4  # half size of what stands for an endless plane
+WIDE = 1e3  # the same, where a scene must not be so large
+
+
+# A cube of quadrangles, as an OBJ file.
+CUBE_OBJ = """v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
+f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 2 3 7 6\nf 1 5 8 4\n"""
 
 
 class Triangles(NamedTuple):
@@ -39,6 +47,19 @@ def rotation(axis: ArrayLike, angle: float) -> FloatArray:
 TURNED = rotation((1.0, 2.0, 3.0), 0.7)  # an attitude without the luck of the axes
 
 
+def affine(linear: ArrayLike = 1.0, shift: ArrayLike = 0.0) -> FloatArray:
+    """(4, 4) transform x -> linear x + shift; a number scales."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.asarray(linear, np.float64) * (np.eye(3) if np.ndim(linear) == 0 else 1.0)
+    matrix[:3, 3] = shift
+    return matrix
+
+
+def mesh_of(triangles: Triangles, **more: object) -> Mesh:
+    """A mesh of aobake with whatever else is given."""
+    return Mesh(vertices=triangles.vertices, faces=triangles.faces, **more)  # type: ignore[arg-type]
+
+
 def joined(*parts: Triangles) -> Triangles:
     """Several meshes as one; nothing is welded."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])[:-1]
@@ -50,9 +71,8 @@ def joined(*parts: Triangles) -> Triangles:
 
 def moved(mesh: Triangles, linear: ArrayLike = 1.0, shift: ArrayLike = 0.0) -> Triangles:
     """The mesh after x -> linear x + shift; a number scales."""
-    matrix = np.asarray(linear, np.float64)
-    matrix = matrix * np.eye(3) if matrix.ndim == 0 else matrix
-    return Triangles(mesh.vertices @ matrix.T + np.asarray(shift, np.float64), mesh.faces)
+    matrix = affine(linear, shift)
+    return Triangles(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], mesh.faces)
 
 
 def flipped(mesh: Triangles) -> Triangles:
@@ -89,6 +109,15 @@ def floor(half: float = FAR, height: float = 0.0, cells: int = 1) -> Triangles:
     """A square that looks up, [-half, half]^2 at a height."""
     x = half
     return patch((-x, -x, height), (x, -x, height), (x, x, height), (-x, x, height), cells, cells)
+
+
+def right_angle(size: float, cells: int = 4) -> Triangles:
+    """A floor at z = 0 and a wall at x = 0, squares that share an edge and look at each other; not welded."""
+    s = size
+    return joined(
+        patch((0, 0, 0), (s, 0, 0), (s, s, 0), (0, s, 0), cells, cells),
+        patch((0, 0, 0), (0, s, 0), (0, s, s), (0, 0, s), cells, cells),
+    )
 
 
 BOX_SIDES = {
@@ -189,3 +218,8 @@ def hexagon_around(point: ArrayLike, normal: ArrayLike, size: float) -> Triangle
     i = np.arange(6)
     faces = np.stack([np.zeros(6, np.int64), 1 + i, 1 + (i + 1) % 6], axis=1)
     return Triangles(vertices + np.asarray(point, np.float64), faces.astype(np.int32))
+
+
+# A wall at x = 0 that looks to +x, and vertex 0 of a speck of floor at distance 1 from it.
+WALL = patch((0, -WIDE, -WIDE), (0, WIDE, -WIDE), (0, WIDE, WIDE), (0, -WIDE, WIDE))
+BESIDE_A_WALL = joined(hexagon_around((1.0, 0.0, 0.0), UP, 1e-3), WALL)

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from aobake import BakedVertices, BakeSettings, Instance, Mesh, Scene, bake_vertices, visibility
+from aobake import BakedVertices, BakeSettings, Instance, Scene, bake_vertices, visibility
 from tests.known import rectangle_factor
 from tests.scenes import (
     TURNED,
@@ -18,11 +18,13 @@ from tests.scenes import (
     FloatArray,
     IntArray,
     Triangles,
+    affine,
     box,
     flipped,
     floor,
     icosphere,
     joined,
+    mesh_of,
     moved,
     patch,
     unwelded,
@@ -274,11 +276,9 @@ def test_what_is_passed_over_is_said_in_one_line(name: str) -> None:
 
 def test_every_instance_has_its_own_values_in_order() -> None:
     ball, ground = icosphere(1), floor(50.0, -1.0)
-    meshes = tuple(Mesh(vertices=m.vertices, faces=m.faces) for m in (ball, ground))
-    away = np.eye(4)
-    away[2, 3] = 1e3
+    away = affine(1.0, (0.0, 0.0, 1e3))
     scene = Scene(
-        meshes=meshes,
+        meshes=(mesh_of(ball), mesh_of(ground)),
         instances=(Instance(mesh=0, transform=away), Instance(mesh=1), Instance(mesh=0)),
     )
     result = bake_vertices(scene, BakeSettings(rays=64))

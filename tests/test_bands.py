@@ -6,7 +6,6 @@ import pickle
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from aobake import (
@@ -14,7 +13,6 @@ from aobake import (
     BakeSettings,
     InputError,
     Instance,
-    Mesh,
     Scene,
     bake_texture,
 )
@@ -29,7 +27,7 @@ from aobake.lightmaps import (
 )
 from aobake.meshes.scene import Attribute, Image, Material, Texture
 from aobake.settings import ToleranceOf
-from tests.scenes import box, floor, icosphere, moved
+from tests.scenes import affine, box, floor, icosphere, mesh_of, moved
 
 BAKE = BakeSettings(size=40, rays=32, denoise="off", blend="multiply", normal_map=True, threads=1)
 ROWS = [range(1), range(1, 8), range(8, 29), range(29, 30), range(30, 40)]
@@ -43,20 +41,13 @@ def scene() -> Scene:
     """A floor of a broken material, a box that rests on it, and balls that share their place in the file."""
     ground, ball = floor(1.0, cells=3), icosphere(1, 0.2)
     cube = moved(box(), 0.5, (0.0, 0.0, 0.25))
-    there = [np.eye(4), np.eye(4)]
-    there[0][:3, 3], there[1][:3, 3] = (0.6, 0.0, 0.3), (-0.6, 0.0, 0.15)
+    there = [affine(1.0, place) for place in ((0.6, 0.0, 0.3), (-0.6, 0.0, 0.15))]
     uv = Attribute(values=(ground.vertices[:, :2] + 1.0) / 2.0)
     return Scene(
         meshes=(
-            Mesh(
-                vertices=ground.vertices,
-                faces=ground.faces,
-                name="floor",
-                material=0,
-                attributes={"TEXCOORD_0": uv},
-            ),
-            Mesh(vertices=cube.vertices, faces=cube.faces, name="cube"),
-            Mesh(vertices=ball.vertices, faces=ball.faces, normals=ball.vertices, name="ball"),
+            mesh_of(ground, name="floor", material=0, attributes={"TEXCOORD_0": uv}),
+            mesh_of(cube, name="cube"),
+            mesh_of(ball, normals=ball.vertices, name="ball"),
         ),
         instances=(
             Instance(mesh=0),

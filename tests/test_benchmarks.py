@@ -179,13 +179,15 @@ def test_every_benchmark_of_the_project_is_found() -> None:
     assert not listed & {"scan", "bodies", "tables", "effect_pictures", "spheres"}
 
 
-def test_the_page_on_performance_asks_for_benchmarks_that_exist(modules: Modules) -> None:
-    page = (ROOT / "docs" / "performance.md").read_text(encoding="utf-8")
-    asked = {name for name, _ in modules.page.PLACE.findall(page)}
+def test_the_pages_ask_for_benchmarks_that_exist(modules: Modules) -> None:
     listed = {line.split()[0] for line in python(str(FOLDER), "--list").stdout.splitlines()}
-    assert asked
-    assert asked <= listed
-    assert page.count("<!-- end -->") == len(modules.page.PLACE.findall(page))
+    for path in modules.page.PAGES:
+        page = path.read_text(encoding="utf-8")
+        asked = {name for name, _ in modules.page.PLACE.findall(page)}
+        assert asked
+        assert asked <= listed | {modules.page.ITSELF}
+        assert page.count("<!-- end -->") == len(modules.page.PLACE.findall(page))
+    assert modules.page.DRAWN.keys() <= listed
 
 
 def test_a_place_of_the_page_takes_the_last_whole_run(

@@ -11,7 +11,6 @@ import pytest
 from aobake import (
     BakeSettings,
     Instance,
-    Mesh,
     OutputError,
     Scene,
     SettingsError,
@@ -22,21 +21,21 @@ from aobake import (
 )
 from tests.conftest import Run
 from tests.scenes import (
-    FloatArray,
+    BESIDE_A_WALL,
+    TURNED,
     Triangles,
+    affine,
     box,
     floor,
-    hexagon_around,
     icosphere,
     joined,
-    patch,
-    rotation,
+    mesh_of,
+    right_angle,
+    unit,
 )
 
-WIDE = 1e3
-WALL = patch((0, -WIDE, -WIDE), (0, WIDE, -WIDE), (0, WIDE, WIDE), (0, -WIDE, WIDE))
 # 1 / pi times the integral of (x, z) times the cosine over the quarter of the sphere that is open.
-BESIDE_A_WALL = np.array([2.0 / (3.0 * math.pi), 0.0, 1.0 / 3.0])
+LEANING = unit((2.0 / (3.0 * math.pi), 0.0, 1.0 / 3.0))
 BENT = BakeSettings(rays=2048, bent_normals=True)
 
 
@@ -47,16 +46,13 @@ def bent(mesh: Triangles, settings: BakeSettings = BENT) -> np.ndarray:
 
 
 def test_beside_a_wall_it_leans_away_by_the_closed_form() -> None:
-    mesh = joined(hexagon_around((1.0, 0.0, 0.0), (0, 0, 1), 1e-3), WALL)
-    expected = BESIDE_A_WALL / np.linalg.norm(BESIDE_A_WALL)
-    assert np.abs(bent(mesh)[0] - expected).max() < 3e-3
+    assert np.abs(bent(BESIDE_A_WALL)[0] - LEANING).max() < 3e-3
 
 
 def test_with_uniform_directions_it_leans_more() -> None:
     """Without the cosine the means of x and z over a quarter of the sphere are the same: 45 degrees."""
-    mesh = joined(hexagon_around((1.0, 0.0, 0.0), (0, 0, 1), 1e-3), WALL)
-    found = bent(mesh, BakeSettings(rays=2048, bent_normals=True, distribution="uniform"))[0]
-    assert np.abs(found - np.array([1.0, 0.0, 1.0]) / math.sqrt(2.0)).max() < 5e-3
+    uniform = BakeSettings(rays=2048, bent_normals=True, distribution="uniform")
+    assert np.abs(bent(BESIDE_A_WALL, uniform)[0] - unit((1.0, 0.0, 1.0))).max() < 5e-3
 
 
 @pytest.mark.parametrize("effect", [(), ("open_sky=off",)])
@@ -88,31 +84,19 @@ def test_where_nothing_is_open_it_is_the_normal() -> None:
 )
 def test_it_goes_with_other_effects(settings: dict[str, object]) -> None:
     """The ground is under all of it and changes nothing; far falloff hardly does."""
-    mesh = joined(hexagon_around((1.0, 0.0, 0.0), (0, 0, 1), 1e-3), WALL)
-    found = bent(mesh, BakeSettings(rays=1024, bent_normals=True, **settings))[0]  # type: ignore[arg-type]
-    expected = BESIDE_A_WALL / np.linalg.norm(BESIDE_A_WALL)
-    assert np.abs(found - expected).max() < 0.01
-
-
-def placed(shift: float, linear: FloatArray) -> FloatArray:
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[0, 3] = linear, shift
-    return matrix
+    given = BakeSettings(rays=1024, bent_normals=True, **settings)  # type: ignore[arg-type]
+    assert np.abs(bent(BESIDE_A_WALL, given)[0] - LEANING).max() < 0.01
 
 
 def corners() -> Scene:
     """A corner that stands as it is, turned, mirrored and sheared, far apart."""
-    shape = joined(
-        patch((0, 0, 0), (4, 0, 0), (4, 4, 0), (0, 4, 0), 4, 4),
-        patch((0, 0, 0), (0, 4, 0), (0, 4, 4), (0, 0, 4), 4, 4),
-    )
     shear = np.eye(3)
     shear[0, 1] = 0.5
-    linears = [np.eye(3), 2.0 * rotation((1, 2, 3), 0.7), np.diag([-1.0, 1.0, 1.0]), shear]
+    linears = [np.eye(3), 2.0 * TURNED, np.diag([-1.0, 1.0, 1.0]), shear]
     return Scene(
-        meshes=(Mesh(vertices=shape.vertices, faces=shape.faces, name="corner"),),
+        meshes=(mesh_of(right_angle(4.0), name="corner"),),
         instances=tuple(
-            Instance(mesh=0, transform=placed(1e3 * k, linear), name=f"{k}")
+            Instance(mesh=0, transform=affine(linear, (1e3 * k, 0.0, 0.0)), name=f"{k}")
             for k, linear in enumerate(linears)
         ),
     )

@@ -16,7 +16,6 @@ from aobake import (
     BakeSettings,
     ImageSettings,
     Instance,
-    Mesh,
     OutputError,
     Scene,
     bake_texture,
@@ -31,13 +30,24 @@ from aobake.meshes.lightmap import Unwrapped
 from aobake.meshes.scene import Attribute
 from aobake.plan import texture_plan
 from tests.conftest import Run
-from tests.scenes import FloatArray, floor, icosphere, patch, rotation
+from tests.scenes import (
+    UP,
+    WALL,
+    FloatArray,
+    affine,
+    flipped,
+    floor,
+    icosphere,
+    mesh_of,
+    moved,
+    patch,
+    rotation,
+    unit,
+)
 
-WIDE = 1e3
-WALL = patch((1, WIDE, -WIDE), (1, -WIDE, -WIDE), (1, -WIDE, WIDE), (1, WIDE, WIDE))  # to +x
+WALL_AT_1 = moved(flipped(WALL), 1.0, (1.0, 0.0, 0.0))
 # Of the quarter of the sphere that is open beside an endless wall: as in test_effects_bent_normals.py.
-LEANING = np.array([-2.0 / math.pi, 0.0, 1.0]) / math.hypot(2.0 / math.pi, 1.0)
-UP = np.array([0.0, 0.0, 1.0])
+LEANING = unit((-2.0 / math.pi, 0.0, 1.0))
 SETTINGS = BakeSettings(size=32, rays=256, denoise="off", atlas="mesh", bent_normals=True)
 GROUND = floor(0.6, cells=4)
 
@@ -55,16 +65,12 @@ def uv_of(vertices: FloatArray, way: str = "upright") -> Attribute:
 
 def beside_a_wall(way: str = "upright", transform: FloatArray | None = None) -> Scene:
     """The floor, laid out that way and standing there, before a wall without an end at x = 1."""
-    ground = Mesh(
-        vertices=GROUND.vertices,
-        faces=GROUND.faces,
-        name="floor",
-        attributes={"TEXCOORD_0": uv_of(GROUND.vertices, way)},
-    )
-    wall = Mesh(vertices=WALL.vertices, faces=WALL.faces, name="wall")
-    stands = np.eye(4) if transform is None else transform
+    uv = uv_of(GROUND.vertices, way)
+    ground = mesh_of(GROUND, name="floor", attributes={"TEXCOORD_0": uv})
+    stands = affine() if transform is None else transform
     return Scene(
-        meshes=(ground, wall), instances=(Instance(mesh=0, transform=stands), Instance(mesh=1))
+        meshes=(ground, mesh_of(WALL_AT_1, name="wall")),
+        instances=(Instance(mesh=0, transform=stands), Instance(mesh=1)),
     )
 
 
@@ -72,12 +78,6 @@ def directions(found: BakedTexture, page: int = 0) -> NDArray[np.float32]:
     """(T, 3) of the texels of a page."""
     assert found.bent_normals is not None
     return found.bent_normals[page][found.coverages[page]]
-
-
-def placed(linear: FloatArray) -> FloatArray:
-    transform = np.eye(4)
-    transform[:3, :3] = linear
-    return transform
 
 
 @pytest.mark.parametrize("space", ["tangent", "object"])
@@ -103,7 +103,7 @@ def test_along_tangents_it_leans_away_from_a_wall_however_the_floor_is_laid_out(
     way: str, linear: FloatArray
 ) -> None:
     """Put back together from the tangents of the layout, and those from its gradients."""
-    found = bake_texture(beside_a_wall(way, placed(linear)), SETTINGS)
+    found = bake_texture(beside_a_wall(way, affine(linear)), SETTINGS)
     along = {"upright": (1, 0, 0), "mirrored": (-1, 0, 0), "turned": (0, 1, 0)}[way]
     down = {"upright": (0, 1, 0), "mirrored": (0, 1, 0), "turned": (-1, 0, 0)}[way]
     axes = [linear @ along, -(linear @ down), UP]
@@ -116,7 +116,7 @@ def test_along_tangents_it_leans_away_from_a_wall_however_the_floor_is_laid_out(
 
 @pytest.mark.parametrize("supersample", [1, 2])
 def test_in_the_space_of_the_mesh_it_is_what_vertices_have(supersample: int) -> None:
-    scene = beside_a_wall("turned", placed(rotation((0, 0, 1), 0.5)))
+    scene = beside_a_wall("turned", affine(rotation((0, 0, 1), 0.5)))
     settings = BakeSettings(
         size=32, rays=512, denoise="off", atlas="mesh", bent_normals=True,
         bent_space="object", supersample=supersample, method="point",
@@ -134,8 +134,8 @@ def test_a_mesh_that_has_no_coordinates_takes_those_of_its_new_layout() -> None:
     ball = icosphere(3)
     lid = patch((-9, -9, 1.2), (-9, 9, 1.2), (9, 9, 1.2), (9, -9, 1.2))
     meshes = (
-        Mesh(vertices=ball.vertices, faces=ball.faces, normals=ball.vertices, name="ball"),
-        Mesh(vertices=lid.vertices, faces=lid.faces, name="lid"),
+        mesh_of(ball, normals=ball.vertices, name="ball"),
+        mesh_of(lid, name="lid"),
     )
     scene = Scene(meshes=meshes, instances=(Instance(mesh=0), Instance(mesh=1)))
     settings = replace(SETTINGS, size=96)
@@ -160,8 +160,7 @@ def test_a_mesh_that_has_no_coordinates_takes_those_of_its_new_layout() -> None:
 def test_what_is_stored_together_has_the_mean_of_its_instances() -> None:
     """One floor beside the wall, one far from it: between leaning and straight up, by how open each is."""
     scene = beside_a_wall()
-    away = np.eye(4)
-    away[0, 3] = -1e6
+    away = affine(1.0, (-1e6, 0.0, 0.0))
     both = Scene(
         meshes=scene.meshes,
         instances=(

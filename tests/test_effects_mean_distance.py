@@ -13,7 +13,6 @@ from aobake import (
     BakedVertices,
     BakeSettings,
     Instance,
-    Mesh,
     OutputError,
     Scene,
     SettingsError,
@@ -27,22 +26,25 @@ from aobake.meshes.formats.gltf.means import mean_direction, mean_length, mean_o
 from aobake.settings import StoreSettings
 from tests.conftest import Run
 from tests.scenes import (
+    BESIDE_A_WALL,
+    ORIGIN,
+    TURNED,
+    UP,
+    WIDE,
     Triangles,
+    affine,
     box,
     flipped,
     floor,
     hexagon_around,
     icosphere,
     joined,
-    patch,
-    rotation,
+    mesh_of,
+    right_angle,
 )
 from tests.support import one_line
 
-WIDE = 1e3
-WALL = patch((0, -WIDE, -WIDE), (0, WIDE, -WIDE), (0, WIDE, WIDE), (0, -WIDE, WIDE))
-BESIDE_A_WALL = joined(hexagon_around((1.0, 0.0, 0.0), (0, 0, 1), 1e-3), WALL)
-BELOW_A_PLANE = joined(hexagon_around((0.0, 0.0, 0.0), (0, 0, 1), 1e-3), flipped(floor(WIDE, 1.0)))
+BELOW_A_PLANE = joined(hexagon_around(ORIGIN, UP, 1e-3), flipped(floor(WIDE, 1.0)))
 FAR = BakeSettings(rays=4096, mean_distance=True)
 
 
@@ -122,26 +124,18 @@ def test_what_needs_no_ray_is_as_far_as_counts_or_at_nothing() -> None:
     assert (distances(under)[0][: len(inner)][inner] == 0.0).all(), "face to face with the floor"
 
 
-def corner(size: float) -> Triangles:
-    return joined(
-        patch((0, 0, 0), (size, 0, 0), (size, size, 0), (0, size, 0), 4, 4),
-        patch((0, 0, 0), (0, size, 0), (0, size, size), (0, 0, size), 4, 4),
-    )
-
-
 def test_it_grows_with_the_scene() -> None:
     """In float32 tripled coordinates round in another way, and a few rays beside edges with them."""
-    small = distances(baked(corner(4.0), replace(FAR, max_distance=2.0)))[0]
-    large = distances(baked(corner(12.0), replace(FAR, max_distance=6.0)))[0]
+    small = distances(baked(right_angle(4.0), replace(FAR, max_distance=2.0)))[0]
+    large = distances(baked(right_angle(12.0), replace(FAR, max_distance=6.0)))[0]
     assert np.abs(3.0 * small - large).max() < 0.02
 
 
 def test_a_larger_placement_is_not_a_copy() -> None:
     """Its occlusion is the same and could be shared, but not its distances."""
-    shape, larger = corner(4.0), np.eye(4)
-    larger[:3, :3], larger[0, 3] = 3.0 * rotation((1, 2, 3), 0.7), 30.0
+    larger = affine(3.0 * TURNED, (30.0, 0.0, 0.0))
     scene = Scene(
-        meshes=(Mesh(vertices=shape.vertices, faces=shape.faces, name="corner"),),
+        meshes=(mesh_of(right_angle(4.0), name="corner"),),
         instances=(Instance(mesh=0), Instance(mesh=0, transform=larger)),
     )
     settings = BakeSettings(rays=256, occluders=("own",), mean_distance=True)
@@ -152,8 +146,7 @@ def test_a_larger_placement_is_not_a_copy() -> None:
 def two() -> Scene:
     """A floor and a box over it."""
     shapes = {"floor": floor(1.0, 0.0, 4), "box": box((-0.2, -0.2, 0.1), (0.2, 0.2, 0.5))}
-    meshes = [Mesh(vertices=m.vertices, faces=m.faces, name=name) for name, m in shapes.items()]
-    return Scene.from_meshes(meshes)
+    return Scene.from_meshes([mesh_of(shape, name=name) for name, shape in shapes.items()])
 
 
 @pytest.mark.parametrize("name", ["new.glb", "new.gltf", "new.ply"])

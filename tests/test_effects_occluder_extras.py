@@ -12,7 +12,6 @@ from aobake import (
     BakeSettings,
     Instance,
     Material,
-    Mesh,
     Scene,
     SettingsError,
     bake_vertices,
@@ -21,7 +20,7 @@ from aobake import (
 )
 from aobake.occluders import occluding
 from tests.conftest import Run
-from tests.scenes import floor
+from tests.scenes import floor, mesh_of
 from tests.support import one_line
 
 NODES = [
@@ -38,7 +37,7 @@ def asset(tmp_path: Path) -> Path:
     sheets = [floor(1.0, 0.25 * number, 2) for number in range(4)]
     names = ["a", "b", "c", "extras:odd"]
     meshes = tuple(
-        Mesh(vertices=sheet.vertices, faces=sheet.faces, name=name, material=number % 2)
+        mesh_of(sheet, name=name, material=number % 2)
         for number, (sheet, name) in enumerate(zip(sheets, names, strict=True))
     )
     scene = Scene(

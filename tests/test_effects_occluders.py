@@ -11,7 +11,6 @@ from aobake import (
     BakeSettings,
     Instance,
     Material,
-    Mesh,
     Scene,
     SettingsError,
     bake_texture,
@@ -19,32 +18,21 @@ from aobake import (
     plan,
     visibility,
 )
-from tests.scenes import FloatArray, Triangles, box, floor, joined, moved, rotation
+from tests.scenes import FloatArray, Triangles, affine, box, floor, joined, mesh_of, moved, rotation
 
 PLATE = floor(3.0, -0.5, 6)
 CORNER = joined(box(), moved(box(), 0.5, (0.1, 0.0, 0.6)))  # occludes itself
 TURNED = rotation((0.0, 0.0, 1.0), 0.5)
 
 
-def placed(shift: tuple[float, float, float], linear: FloatArray | None = None) -> FloatArray:
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.eye(3) if linear is None else linear
-    matrix[:3, 3] = shift
-    return matrix
-
-
-def mesh(shape: Triangles, name: str, material: int | None = None) -> Mesh:
-    return Mesh(vertices=shape.vertices, faces=shape.faces, name=name, material=material)
-
-
 def scene(*extra: Instance) -> Scene:
     """A plate, and two of one body on it, one of them turned and larger."""
     return Scene(
-        meshes=(mesh(PLATE, "plate", 0), mesh(CORNER, "body")),
+        meshes=(mesh_of(PLATE, name="plate", material=0), mesh_of(CORNER, name="body")),
         instances=(
             Instance(mesh=0, name="ground plate"),
-            Instance(mesh=1, transform=placed((-1.0, 0.0, 0.01)), name="left"),
-            Instance(mesh=1, transform=placed((1.2, 0.0, 0.2), 1.3 * TURNED), name="right"),
+            Instance(mesh=1, transform=affine(1.0, (-1.0, 0.0, 0.01)), name="left"),
+            Instance(mesh=1, transform=affine(1.3 * TURNED, (1.2, 0.0, 0.2)), name="right"),
             *extra,
         ),
         materials=(Material(name="stone"),),
@@ -138,7 +126,7 @@ def test_one_word_is_a_name_too() -> None:
 
 
 FAR_APART = [
-    Instance(mesh=1, transform=placed((20.0 * k, 50.0, 0.0), rotation((1, 2, 3), float(k))))
+    Instance(mesh=1, transform=affine(rotation((1, 2, 3), float(k)), (20.0 * k, 50.0, 0.0)))
     for k in range(4)
 ]
 
@@ -161,25 +149,25 @@ def test_placements_that_nothing_reaches_share_one_bake() -> None:
 @pytest.mark.parametrize(
     ("other", "settings"),
     [
-        (placed((-17.0, 50.0, 0.0)), BakeSettings(rays=64, max_distance=20.0)),
-        (placed((30.0, 50.0, 0.0), 2.0 * np.eye(3)), BakeSettings(rays=64, max_distance=2.0)),
-        (placed((30.0, 50.0, 0.0), np.diag([1, 1, 2])), BakeSettings(rays=64, max_distance=2.0)),
-        (placed((30.0, 50.0, 0.0)), BakeSettings(rays=64)),
-        (placed((30.0, 50.0, 0.0)), BakeSettings(rays=64, max_distance=2.0, ground="+z")),
+        (affine(1.0, (-17.0, 50.0, 0.0)), BakeSettings(rays=64, max_distance=20.0)),
+        (affine(2.0, (30.0, 50.0, 0.0)), BakeSettings(rays=64, max_distance=2.0)),
+        (affine(np.diag([1, 1, 2]), (30.0, 50.0, 0.0)), BakeSettings(rays=64, max_distance=2.0)),
+        (affine(1.0, (30.0, 50.0, 0.0)), BakeSettings(rays=64)),
+        (affine(1.0, (30.0, 50.0, 0.0)), BakeSettings(rays=64, max_distance=2.0, ground="+z")),
     ],
     ids=["within reach", "larger", "stretched", "no limit", "near the ground"],
 )
 def test_placements_that_may_differ_are_all_traced(
     other: FloatArray, settings: BakeSettings
 ) -> None:
-    first = Instance(mesh=1, transform=placed((0.0, 50.0, 0.0)))
+    first = Instance(mesh=1, transform=affine(1.0, (0.0, 50.0, 0.0)))
     found = plan(scene(first, Instance(mesh=1, transform=other)), settings)
     assert not found.effects["sharing"].on
 
 
 def test_a_mirrored_copy_is_shared_and_bent_normals_are_not_turned() -> None:
-    mirrored = Instance(mesh=1, transform=placed((30.0, 50.0, 0.0), np.diag([-1, 1, 1])))
-    first = Instance(mesh=1, transform=placed((0.0, 50.0, 0.0)))
+    mirrored = Instance(mesh=1, transform=affine(np.diag([-1, 1, 1]), (30.0, 50.0, 0.0)))
+    first = Instance(mesh=1, transform=affine(1.0, (0.0, 50.0, 0.0)))
     limited = BakeSettings(rays=64, max_distance=2.0)
     assert plan(scene(first, mirrored), limited).effects["sharing"].on
     bent = BakeSettings(rays=64, max_distance=2.0, bent_normals=True)

@@ -98,7 +98,9 @@ def test_towards_a_tolerance_open_points_cost_nothing_either() -> None:
         joined(icosphere(3), moved(icosphere(2), 0.2, (1.5, 0.0, 0.0))), OFF, tolerance=0.01
     )
     assert found.rays < 0.8 * off.rays
-    assert np.abs(found.ao[0] - off.ao[0]).max() < 1e-6
+    # Not the same bytes: points next to each other tell each other how many rays they need.
+    allowed = 4.0 * np.hypot(found.standard_error[0], off.standard_error[0])
+    assert (np.abs(found.ao[0] - off.ao[0]) <= allowed + 1e-6).all()
 
 
 def test_points_inside_the_faces_of_a_coarse_ball_are_open() -> None:

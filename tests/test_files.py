@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -71,6 +72,32 @@ def test_a_missing_folder_is_named_before_anything_is_written(tmp_path: Path) ->
     with pytest.raises(OutputError, match="there is no folder"):
         files.write_files({tmp_path / "ok": b"", tmp_path / "no" / "file": b""})
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_has_the_name_of_an_unfinished_one_until_it_is_whole(tmp_path: Path) -> None:
+    meanwhile: list[str] = []
+
+    def pieces() -> Iterator[bytes]:
+        meanwhile.extend(path.name for path in tmp_path.iterdir())
+        yield b"content"
+
+    files.write_files({tmp_path / "a": pieces()})
+    assert len(meanwhile) == 1
+    assert meanwhile[0].startswith(files.PART)
+    assert files.is_unfinished(meanwhile[0])
+    assert not files.is_unfinished("a")
+    assert not files.is_unfinished(f"{meanwhile[0]}.glb")
+
+
+def test_a_folder_is_made_once_and_what_is_in_its_way_is_named(tmp_path: Path) -> None:
+    folder = tmp_path / "deep" / "down"
+    assert files.make_folder(folder)
+    assert not files.make_folder(folder)
+    (folder / "file").write_bytes(b"")
+    with pytest.raises(OutputError, match=r"down/file: this folder cannot be made \(File exists"):
+        files.make_folder(folder / "file")
+    with pytest.raises(OutputError, match=r"^a\.glb: its folder .*file/b cannot be made"):
+        files.make_folder(folder / "file" / "b", needed_by="a.glb")
 
 
 def test_a_folder_is_no_target(tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ def understood(line: list[str], monkeypatch: pytest.MonkeyPatch) -> Job:
     seen: list[Job] = []
     with monkeypatch.context() as patched:
         patched.setattr("signal.signal", lambda *_: None)
-        patched.setattr("aobake.cli.work.do", lambda job, _common: seen.append(job))
+        patched.setattr("aobake.cli.work._do", lambda job, _common: seen.append(job))
         assert line[0] == "aobake"
         assert main(shlex.split(shlex.join(line))[1:]) == 0
     return seen[0]

@@ -20,7 +20,10 @@ PACKAGE = ROOT / "aobake"
 
 # From the ground up: a module imports from its own layer and from those before it.
 LAYERS = (
-    ("errors", "findings", "overrides", "settings", "render_settings", "files", "images", "stages"),
+    (
+        "errors", "checks", "findings", "overrides", "settings", "render_settings",
+        "files", "images", "stages", "standalone",
+    ),
     ("tracing",),
     ("meshes",),
     ("occluders", "prepare", "points", "sharing", "open_sky", "occlusion", "leastsquares"),
@@ -30,7 +33,7 @@ LAYERS = (
         "plan", "planning", "bake", "lightmaps",
         "previews", "results", "environment", "study", "report", "demo", "viewer", "__init__",
     ),
-    ("flags", "patterns", "config_file", "config", "jobs"),
+    ("ahead", "flags", "patterns", "config_file", "config", "jobs"),
     ("batch",),
     ("cli", "__main__"),
 )  # fmt: skip
@@ -39,7 +42,7 @@ LAYER_OF = {name: number for number, names in enumerate(LAYERS) for name in name
 # What may be imported in several files; everything else from outside has one file of its own.
 SEVERAL = {
     "numpy": "*.py",
-    "numba": "tracing/*.py *kernels.py",
+    "numba": "tracing/*.py",
     "llvmlite": "tracing/*.py",
     "scipy": "tracing/*.py leastsquares/system.py",
 }

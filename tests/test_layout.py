@@ -11,7 +11,7 @@ from aobake.meshes.lightmap import Kept, Unwrapped
 from aobake.meshes.scene import Attribute
 from aobake.meshes.surfaces import surfaces_of
 from aobake.prepare import build
-from tests.scenes import FloatArray, Triangles, patch
+from tests.scenes import FloatArray, Triangles, affine, mesh_of, patch
 
 SQUARE = patch((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
 
@@ -104,8 +104,7 @@ def test_what_is_of_one_material_shares_an_image() -> None:
 
 
 def test_instances_of_one_mesh_get_places_of_their_own() -> None:
-    away = np.eye(4)
-    away[0, 3] = 5.0
+    away = affine(1.0, (5.0, 0.0, 0.0))
     scene = Scene(
         meshes=(textured(),), instances=(Instance(mesh=0), Instance(mesh=0, transform=away))
     )
@@ -172,7 +171,7 @@ def test_keep_names_the_triangles_that_overlap() -> None:
 
 @pytest.mark.parametrize("uv", ["keep", "2"])
 def test_a_set_that_is_missing_is_refused_where_it_was_asked_for(uv: str) -> None:
-    mesh = Mesh(vertices=SQUARE.vertices, faces=SQUARE.faces, name="seat")
+    mesh = mesh_of(SQUARE, name="seat")
     with pytest.raises(InputError, match=rf"'seat' has no TEXCOORD_{uv.replace('keep', '0')}"):
         laid_out(Scene.from_meshes([mesh]), uv=uv)
 

@@ -12,7 +12,6 @@ from aobake import (
     InputError,
     Instance,
     Material,
-    Mesh,
     Scene,
     bake_texture,
     images,
@@ -20,7 +19,7 @@ from aobake import (
 from aobake.atlas.lookup import sample
 from aobake.lightmaps import bands
 from aobake.meshes.scene import Attribute, Image, Texture
-from tests.scenes import FloatArray, Triangles, box, icosphere, moved, patch
+from tests.scenes import FloatArray, Triangles, affine, box, icosphere, mesh_of, moved, patch
 
 SQUARE = patch((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))
 CUBE = moved(box(), 0.5)  # 0.5 wide
@@ -38,13 +37,8 @@ def uniform(name: str, color: tuple[float, float, float]) -> Image:
 def on_its_own_square(mesh: Triangles, half: float = 1.0, **material: object) -> Scene:
     """A scene of a flat mesh whose texture coordinates are its x and y, from corner to corner."""
     uv = (mesh.vertices[:, :2] / half + 1.0) / 2.0
-    parts = Mesh(
-        vertices=mesh.vertices,
-        faces=mesh.faces,
-        name="floor",
-        material=0,
-        attributes={"TEXCOORD_0": Attribute(values=uv)},
-    )
+    attributes = {"TEXCOORD_0": Attribute(values=uv)}
+    parts = mesh_of(mesh, name="floor", material=0, attributes=attributes)
     given = {"name": "plain", **material}
     return Scene(
         meshes=(parts,),
@@ -54,18 +48,9 @@ def on_its_own_square(mesh: Triangles, half: float = 1.0, **material: object) ->
     )
 
 
-def shifted(x: float) -> FloatArray:
-    """A transform along x."""
-    transform = np.eye(4)
-    transform[0, 3] = x
-    return transform
-
-
 def beside(scene: Scene, *others: Triangles) -> Scene:
     """The scene with more to occlude it; the others lie on the same page, unwrapped."""
-    more = tuple(
-        Mesh(vertices=m.vertices, faces=m.faces, name=f"other {n}") for n, m in enumerate(others)
-    )
+    more = tuple(mesh_of(other, name=f"other {n}") for n, other in enumerate(others))
     placed = tuple(Instance(mesh=len(scene.meshes) + number) for number in range(len(more)))
     return Scene(
         meshes=(*scene.meshes, *more),
@@ -149,8 +134,7 @@ def test_every_bilinear_lookup_on_the_surface_reads_baked_texels_alone() -> None
 
 def test_what_is_stored_together_gets_the_mean_of_its_instances() -> None:
     scene = on_its_own_square(SQUARE)
-    apart = np.eye(4)
-    apart[2, 3] = 50.0
+    apart = affine(1.0, (0.0, 0.0, 50.0))
     both = Scene(
         meshes=scene.meshes,
         instances=(
@@ -227,7 +211,10 @@ def test_progress_ends_a_bake_by_what_it_raises() -> None:
 def test_progress_never_goes_back() -> None:
     """Also where several instances share a place: their turns are parts of one trace."""
     square, cube = on_its_own_square(SQUARE), Scene.from_arrays(*CUBE)
-    others = [Instance(mesh=1, transform=shifted(x), stored_with=1) for x in (0.0, 2.0, 4.0)]
+    others = [
+        Instance(mesh=1, transform=affine(1.0, (x, 0.0, 0.0)), stored_with=1)
+        for x in (0.0, 2.0, 4.0)
+    ]
     scene = Scene(
         meshes=(*square.meshes, *cube.meshes),
         instances=(*square.instances, *others),
@@ -249,7 +236,7 @@ def test_progress_never_goes_back() -> None:
 def test_instances_of_one_name_are_told_of_together() -> None:
     """Five thousand of them would be as many lines."""
     floor = on_its_own_square(SQUARE)
-    several = tuple(Instance(mesh=0, transform=shifted(4.0 * n)) for n in range(3))
+    several = tuple(Instance(mesh=0, transform=affine(1.0, (4.0 * n, 0.0, 0.0))) for n in range(3))
     boxes = [moved(CUBE, shift=(4.0 * n, 0.0, 0.25)) for n in range(3)]
     scene = beside(
         Scene(

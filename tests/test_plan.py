@@ -31,7 +31,7 @@ from aobake.overrides import EFFECTS
 from aobake.plan import texture_plan
 from aobake.planning.cost import estimated
 from tests.conftest import Run
-from tests.scenes import box, floor, icosphere, joined
+from tests.scenes import box, floor, icosphere, joined, mesh_of
 from tests.support import one_line
 
 
@@ -234,7 +234,7 @@ def test_an_estimate_of_nothing_is_nothing(texture: bool) -> None:
 
 def test_an_estimate_of_a_texture_counts_its_pages_and_names_the_stages_of_the_bake() -> None:
     shapes = [icosphere(2), box((2.0, 0.0, 0.0), (3.0, 1.0, 1.0))]
-    scene = Scene.from_meshes([Mesh(vertices=s.vertices, faces=s.faces) for s in shapes])
+    scene = Scene.from_meshes([mesh_of(s) for s in shapes])
     one = BakeSettings(rays=4, size=64, denoise="off")
     several = replace(one, atlas="mesh", supersample=2, denoise="on")
     costs = [estimated(texture_plan(scene, s), scene, s, texture=True) for s in (one, several)]

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import base64
-import dataclasses
 import hashlib
 import html
 import json
 import re
-import shutil
-import struct
 import subprocess
 from html.parser import HTMLParser
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +17,12 @@ import pytest
 
 import aobake
 from aobake.errors import OutputError
-from aobake.images import decode, encode
-from aobake.meshes.materials import Image, Texture
-from aobake.meshes.scene import Attribute
+from aobake.images import encode
 from aobake.viewer import packed_glb, page_of
 from aobake.viewer import page as page_module
-from tests.support import ROOT
+from tests.browser import CHROMIUM
+from tests.meshes.formats.gltf.build import pack_glb, unpack_glb
 
-FOLDER = files("aobake.viewer")
 LOADS = {"src", "href", "srcset", "action", "data", "poster", "background"}  # attributes that fetch
 
 
@@ -68,22 +62,6 @@ class Page(HTMLParser):
 
     def asset(self) -> bytes:
         return base64.b64decode(self.texts["asset"], validate=True)
-
-
-def glb(text: dict[str, object], binary: bytes = b"") -> bytes:
-    body = json.dumps(text).encode()
-    body += b" " * (-len(body) % 4)
-    chunks = struct.pack("<I4s", len(body), b"JSON") + body
-    if binary:
-        chunks += struct.pack("<I4s", len(binary), b"BIN\0") + binary
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
-
-
-def opened(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """The JSON and the BIN chunk of a GLB."""
-    assert struct.unpack_from("<4sII", data) == (b"glTF", 2, len(data))
-    size = struct.unpack_from("<I", data, 12)[0]
-    return json.loads(data[20 : 20 + size]), data[28 + size :]
 
 
 def view_bytes(text: dict[str, Any], binary: bytes, number: int) -> bytes:
@@ -140,7 +118,7 @@ def test_a_page_asks_the_network_for_nothing(corner: Path) -> None:
 
 
 def test_its_policy_allows_its_own_scripts_and_style_and_no_others() -> None:
-    page = Page(page_of(glb({}), "x"))
+    page = Page(page_of(pack_glb({}), "x"))
     allowed = re.findall(r"'sha256-([^']+)'", page.policy())
     own = [*page.scripts, page.texts["style"]]
     hashes = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in own]
@@ -153,7 +131,7 @@ def test_its_policy_allows_its_own_scripts_and_style_and_no_others() -> None:
     ["<script>alert(1)</script>", "\"a\" & 'b'.glb", "$asset ${name}", "\udcff.glb", "木 ü"],
 )
 def test_the_name_of_an_asset_is_a_text_and_nothing_else(name: str) -> None:
-    page = Page(page_of(glb({}), name, [name]))
+    page = Page(page_of(pack_glb({}), name, [name]))
     shown = name.encode("utf-8", "replace").decode()
     assert page.texts["title"] == shown
     assert page.texts["h1"] == shown
@@ -162,8 +140,8 @@ def test_the_name_of_an_asset_is_a_text_and_nothing_else(name: str) -> None:
 
 
 def test_the_decoder_of_draco_comes_with_assets_that_need_it() -> None:
-    plain = page_of(glb({}), "x")
-    draco = page_of(glb({"extensionsUsed": ["KHR_draco_mesh_compression"]}), "x")
+    plain = page_of(pack_glb({}), "x")
+    draco = page_of(pack_glb({"extensionsUsed": ["KHR_draco_mesh_compression"]}), "x")
     assert len(Page(draco).scripts) == 2
     assert len(draco) > len(plain) + 200_000
     assert len(draco) < 1_300_000
@@ -172,19 +150,19 @@ def test_the_decoder_of_draco_comes_with_assets_that_need_it() -> None:
 
 
 def test_the_asset_comes_out_as_it_went_in() -> None:
-    data = glb({"asset": {"version": "2.0"}}, bytes(range(256)))
+    data = pack_glb({"asset": {"version": "2.0"}}, bytes(range(256)))
     assert Page(page_of(data, "x")).asset() == data
 
 
 def test_an_asset_too_large_for_a_browser_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(page_module, "MOST_BYTES", 1 << 20)
     with pytest.raises(OutputError, match=r"big\.glb: it takes 2 MiB"):
-        page_of(glb({}, bytes(2 << 20)), "big.glb")
+        page_of(pack_glb({}, bytes(2 << 20)), "big.glb")
 
 
 def test_a_scattered_gltf_becomes_one_file_and_loses_nothing(tmp_path: Path) -> None:
     packed = packed_glb(aobake.load(write_scattered(tmp_path)))
-    text, binary = opened(packed.glb)
+    text, binary, _ = unpack_glb(packed.glb)
     assert "uri" not in json.dumps(text)
     assert text["buffers"] == [{"byteLength": len(binary)}]
     assert view_bytes(text, binary, 0) == TRIANGLE
@@ -213,7 +191,7 @@ def test_compressed_views_are_turned_to_where_their_bytes_are(tmp_path: Path) ->
         }
     )
     path.write_text(json.dumps(text), encoding="utf-8")
-    text, binary = opened(packed_glb(aobake.load(path)).glb)
+    text, binary, _ = unpack_glb(packed_glb(aobake.load(path)).glb)
     view = text["bufferViews"][2]
     within = view["extensions"]["EXT_meshopt_compression"]
     assert text["buffers"][view["buffer"]]["byteLength"] == 64
@@ -227,8 +205,8 @@ def test_the_scene_that_was_chosen_is_shown(tmp_path: Path) -> None:
     text = json.loads(path.read_text(encoding="utf-8"))
     text["scenes"] = [{"nodes": [0]}, {"nodes": [1], "name": "second"}]
     path.write_text(json.dumps(text), encoding="utf-8")
-    assert opened(packed_glb(aobake.load(path)).glb)[0]["scene"] == 0
-    assert opened(packed_glb(aobake.load(path, scene="second")).glb)[0]["scene"] == 1
+    assert unpack_glb(packed_glb(aobake.load(path)).glb)[0]["scene"] == 0
+    assert unpack_glb(packed_glb(aobake.load(path, scene="second")).glb)[0]["scene"] == 1
 
 
 def test_the_pose_that_was_chosen_is_shown(tmp_path: Path) -> None:
@@ -249,132 +227,8 @@ def test_the_pose_that_was_chosen_is_shown(tmp_path: Path) -> None:
     text["animations"] = [clip]
     path.write_text(json.dumps(text), encoding="utf-8")
     packed = packed_glb(aobake.load(path, pose="0@1"), "0@1")
-    assert opened(packed.glb)[0]["nodes"][1] == {"mesh": 0, "translation": [2.0, 0.0, 4.0]}
-    assert "translation" not in opened(packed_glb(aobake.load(path)).glb)[0]["nodes"][1]
-
-
-def square(**more: Any) -> aobake.Mesh:
-    """Two triangles in a plane."""
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float64)
-    return aobake.Mesh(vertices=vertices, faces=np.array([[0, 1, 2], [0, 2, 3]], np.int32), **more)
-
-
-def read_back(scene: aobake.Scene, tmp_path: Path) -> aobake.Scene:
-    path = tmp_path / "packed.glb"
-    path.write_bytes(packed_glb(scene).glb)
-    return aobake.load(path)
-
-
-def test_occlusion_and_corner_values_of_other_formats_come_along(tmp_path: Path) -> None:
-    uv = Attribute(
-        values=np.arange(12, dtype=np.float64).reshape(6, 2) / 16,
-        corners=np.arange(6, dtype=np.int32).reshape(2, 3),
-    )
-    ao = Attribute(values=np.array([[0.25], [0.5], [0.75], [1.0]]))
-    scene = aobake.Scene.from_meshes([square(attributes={"TEXCOORD_0": uv, "_AO": ao})])
-    mesh = read_back(scene, tmp_path).meshes[0]
-    for name in ("TEXCOORD_0", "_AO"):
-        before, after = scene.meshes[0].at_corners(name), mesh.at_corners(name)
-        assert before is not None
-        assert after is not None
-        np.testing.assert_array_equal(after, before)
-    np.testing.assert_array_equal(
-        mesh.vertices[mesh.faces], scene.meshes[0].vertices[scene.meshes[0].faces]
-    )
-
-
-def test_creases_of_meshes_without_normals_stay_sharp(tmp_path: Path) -> None:
-    fold = np.array([[0, 0, 0], [0, 1, 0], [1, 0, 0], [0, 0, 1]], np.float64)
-    faces = np.array([[0, 2, 1], [0, 1, 3]], np.int32)
-    mesh = read_back(aobake.Scene.from_arrays(fold, faces), tmp_path).meshes[0]
-    assert mesh.normals is not None
-    assert len(mesh.vertices) == 6
-    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
-    facets = np.cross(b - a, c - a)
-    np.testing.assert_allclose(mesh.normals[mesh.faces], np.repeat(facets[:, None], 3, axis=1))
-    flat = read_back(aobake.Scene.from_meshes([square()]), tmp_path).meshes[0]
-    assert len(flat.vertices) == 4, "nothing to split in a plane"
-
-
-def test_textures_of_other_formats_come_along(tmp_path: Path) -> None:
-    turn = np.array([[0.0, 3.0, 0.25], [-2.0, 0.0, 0.5]])
-    texture = Texture(image=0, transform=turn, wrap=("clamp", "mirror"), nearest=True)
-    tiff = encode(np.full((2, 2, 1), 0.25, np.float32), "tiff")
-    material = aobake.Material(
-        base_color_texture=texture,
-        occlusion_texture=Texture(image=1),
-        occlusion_strength=0.5,
-        emissive_texture=Texture(image=2),
-        emissive=(0.0, 2.0, 0.5),
-    )
-
-    def gone() -> bytes:
-        raise aobake.InputError("gone.png: there is no such file.")
-
-    uv = Attribute(values=np.zeros((4, 2)))
-    scene = dataclasses.replace(
-        aobake.Scene.from_meshes([square(attributes={"TEXCOORD_0": uv})]), materials=(material,)
-    )
-    images = tuple(
-        Image(name=name, data=data)
-        for name, data in (("a.png", lambda: PNG), ("b.tif", lambda: tiff), ("c.png", gone))
-    )
-    scene = dataclasses.replace(
-        scene,
-        images=images,
-        meshes=(dataclasses.replace(scene.meshes[0], material=0),),
-    )
-    packed = packed_glb(scene)
-    assert packed.warnings == ("gone.png: there is no such file.",)
-    found = read_back(scene, tmp_path)
-    shown = found.materials[0]
-    assert shown.emissive == (0.0, 1.0, 0.5)
-    assert shown.emissive_texture is None
-    assert shown.occlusion_strength == 0.5
-    assert shown.occlusion_texture is not None
-    converted = decode(found.images[shown.occlusion_texture.image].data(), "x.png")
-    np.testing.assert_allclose(converted, 0.25, atol=0.003)
-    assert shown.base_color_texture is not None
-    assert shown.base_color_texture.wrap == ("clamp", "mirror")
-    assert shown.base_color_texture.nearest
-    assert shown.base_color_texture.transform is not None
-    np.testing.assert_allclose(shown.base_color_texture.transform, turn, atol=1e-12)
-    assert found.images[shown.base_color_texture.image].data() == PNG
-
-
-def test_vendored_files_are_those_that_were_built() -> None:
-    vendor = FOLDER / "vendor"
-    manifest = json.loads((vendor / "manifest.json").read_text(encoding="utf-8"))
-    found = {path.name for path in vendor.iterdir()} - {"manifest.json"}
-    assert found == manifest["files"].keys()
-    for name, digest in manifest["files"].items():
-        assert hashlib.sha256((vendor / name).read_bytes()).hexdigest() == digest, name
-
-
-def test_vendored_files_are_of_the_versions_that_are_pinned() -> None:
-    manifest = json.loads((FOLDER / "vendor" / "manifest.json").read_text(encoding="utf-8"))
-    wanted = json.loads((ROOT / "viewer" / "package.json").read_text(encoding="utf-8"))
-    locked = json.loads((ROOT / "viewer" / "package-lock.json").read_text(encoding="utf-8"))
-    assert manifest["packages"].items() <= wanted["devDependencies"].items()
-    for name, version in wanted["devDependencies"].items():
-        assert re.fullmatch(r"\d+\.\d+\.\d+", version), f"{name} is not pinned"
-        entry = locked["packages"][f"node_modules/{name}"]
-        assert entry["version"] == version
-        assert entry["integrity"].startswith("sha512-")
-
-
-@pytest.mark.parametrize("name", ["viewer.min.js", "draco.min.js"])
-def test_vendored_scripts_cannot_end_the_element_that_holds_them(name: str) -> None:
-    text = (FOLDER / "vendor" / name).read_bytes()
-    assert text.isascii()
-    assert b"</script" not in text.lower()
-    assert b"<!--" not in text
-    assert b"eval(" not in text.replace(b"wasm-unsafe-eval", b"")
-
-
-CHROMIUM = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
+    assert unpack_glb(packed.glb)[0]["nodes"][1] == {"mesh": 0, "translation": [2.0, 0.0, 4.0]}
+    assert "translation" not in unpack_glb(packed_glb(aobake.load(path)).glb)[0]["nodes"][1]
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")

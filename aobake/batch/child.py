@@ -54,13 +54,17 @@ class Heard:
 
 
 class Child:
-    """A process that does tasks."""
+    """A process that does tasks.
+
+    part : how the names of its unfinished files begin; '' until it has begun its first task
+    """
 
     def __init__(self, command: Sequence[str], tell: Callable[[Heard], None]) -> None:
         """Start the process. Raises EngineError where the system refuses.
 
         tell : is called with all that it answers, in a thread of its own
         """
+        self.part = ""
         self._scratch = make_scratch()
         try:
             self._process = _started(command, self._scratch.folder)
@@ -153,7 +157,10 @@ class Child:
         # Exception: what a process sent that broke down in mid-word may be anything
         with _pipe(self._process.stdout) as stream, contextlib.suppress(Exception):
             while True:
-                tell(Heard(self, pickle.load(stream)))  # noqa: S301 - from our child
+                answer = pickle.load(stream)  # noqa: S301 - from our child
+                if isinstance(answer, Ready):
+                    self.part = answer.part  # at once: it may be ended before this is heard
+                tell(Heard(self, answer))
         tell(Heard(self, None))
 
     def _keep_words(self) -> None:

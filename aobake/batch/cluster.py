@@ -17,16 +17,17 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Literal
 
 from aobake import __version__
+from aobake.batch.closing import Closing
 from aobake.batch.cluster_worker import end, perform, retire, unseen
 from aobake.batch.places import LocalFolder, Place
 from aobake.batch.roster import Roster, gone
 from aobake.batch.tasks import Capacity, Executor, Outcome, Status, Task
 from aobake.batch.tiles import TiledExecutor
 from aobake.errors import OutputError, SettingsError
+from aobake.files import PART
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -67,7 +68,7 @@ def on_cluster(
         yield executor
 
 
-class ClusterExecutor:
+class ClusterExecutor(Closing):
     """Runs tasks on the workers of a dask cluster. Close it, or use it as a context."""
 
     def __init__(self, address: str, *, patience: float = PATIENCE_S) -> None:
@@ -173,17 +174,6 @@ class ClusterExecutor:
         """Leave the cluster. Its workers stay; what they were doing for this batch is ended."""
         self._done.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
     def _leave(self) -> None:
         if self._sent:
             self._everywhere(end, self._batch)
@@ -240,7 +230,7 @@ def _probe(folder: Path | None, content: str) -> Iterator[str]:
         return
     try:
         file = tempfile.NamedTemporaryFile(  # noqa: SIM115 - below, where errors are others
-            "w", prefix=".aobake-", suffix=".part", dir=folder, encoding="ascii"
+            "w", prefix=PART, suffix=".part", dir=folder, encoding="ascii"
         )
     except OSError as error:
         why = error.strerror or error

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
-__all__ = ["remove_leftovers"]
+from aobake.files import is_unfinished
 
-# The names that aobake.files gives to what it has not finished, with and without the process; no others.
-_UNFINISHED = re.compile(r"\.aobake-([0-9a-f]{8}-)?[a-z0-9_]{8}\.part")
+__all__ = ["remove_leftovers"]
 
 
 def remove_leftovers(folder: Path) -> tuple[str, ...]:
@@ -35,5 +33,5 @@ def _unfinished(folder: Path) -> Iterator[os.DirEntry[str]]:
             for entry in entries:
                 if entry.is_dir(follow_symlinks=False):
                     waiting.append(entry.path)
-                elif entry.is_file(follow_symlinks=False) and _UNFINISHED.fullmatch(entry.name):
+                elif entry.is_file(follow_symlinks=False) and is_unfinished(entry.name):
                     yield entry

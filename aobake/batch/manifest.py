@@ -10,10 +10,10 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Literal, Self
 
 from aobake import __version__
+from aobake.batch.closing import Closing
 from aobake.batch.database import Database, name_stored, open_database
 from aobake.batch.evidence import evidence
 from aobake.batch.keys import fingerprint, recipe
@@ -40,7 +40,7 @@ Pairs = Iterable[tuple[Planned, Standing]]
 _NO_ASSETS = "there is no asset at all: remove it by hand if that is meant"
 
 
-class Manifest:
+class Manifest(Closing):
     """What is known of all jobs of a target."""
 
     def __init__(self, database: Database, source: Place, target: Place) -> None:
@@ -59,15 +59,8 @@ class Manifest:
         """
         return cls(open_database(path), source, target)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Let go of the file."""
         self._database.close()
 
     def begin(self, facts: Mapping[str, object]) -> int:

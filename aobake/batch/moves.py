@@ -14,6 +14,7 @@ from aobake.batch.standing import Known, Standing, from_here
 from aobake.batch.tasks import Outcome, Planned
 from aobake.batch.tree import STATE, Tree
 from aobake.errors import OutputError
+from aobake.files import UNFINISHED
 
 __all__ = ["adopt"]
 
@@ -83,7 +84,7 @@ def _gift(giver: Known, database: Database) -> _Gift:
 
 def _set_aside(gift: _Gift, number: int, target: Place) -> _Gift:
     """A copy under a name that is swept up with the leftovers, should this run be killed."""
-    name = f"{STATE}/.aobake-{number:08}.part"
+    name = f"{STATE}/{UNFINISHED}{number:08}.part"
     target.copy(gift.file, name)
     return replace(gift, file=name)
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Literal, cast
 
 from aobake.errors import InputError
-from aobake.files import write_files
+from aobake.files import UNFINISHED, write_files
 
 if TYPE_CHECKING:
     from aobake.atlas.layout import Layout
@@ -85,7 +85,7 @@ def first_part(output: str, count: int) -> Part:
     """
     folder, slash, _ = output.rpartition("/")
     # Names of unfinished files: should this run be killed, the next one removes them like any other.
-    stem = f"{folder}{slash}.aobake-{secrets.token_hex(4)}"
+    stem = f"{folder}{slash}{UNFINISHED}{secrets.token_hex(4)}"
     key = secrets.token_bytes(KEY_BYTES)
     return Part(step="layout", number=0, count=count, stem=stem, key=key)
 

@@ -47,6 +47,10 @@ class Place(Protocol):
     def name(self) -> str:
         """As people gave it: a path or a URL."""
 
+    @property
+    def lists_all(self) -> bool:
+        """Whether there is no file but those that `files` finds: no links, which may lead to one in two ways."""
+
     def files(self, enters: Callable[[str], bool]) -> Iterator[Found]:
         """All files, sorted by name; folders whose name `enters` refuses are left out, as are links that go in
         circles."""
@@ -76,6 +80,11 @@ class LocalFolder:
 
     name: str
     folder: Path
+
+    @property
+    def lists_all(self) -> bool:
+        """False: a name may lead through links that `files` does not follow."""
+        return False
 
     def files(self, enters: Callable[[str], bool]) -> Iterator[Found]:
         """All files, sorted by name. Raises InputError where the folder itself cannot be read.
@@ -121,12 +130,7 @@ class LocalFolder:
     def copy(self, name: str, to: str) -> None:
         """Copy a file within the folder, whole or not at all. Raises OutputError."""
         target = self.path(to)
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(
-                f"{target.parent}: this folder cannot be made ({error.strerror or error})."
-            ) from error
+        files.make_folder(target.parent)
         files.write_files({target: _pieces(self.path(name))})
 
     def remove(self, name: str) -> None:

@@ -7,10 +7,9 @@ import queue
 import threading
 import time
 from collections.abc import Sequence
-from types import TracebackType
-from typing import Self
 
 from aobake.batch.child import WORKER
+from aobake.batch.closing import Closing
 from aobake.batch.limits import memory_to_give
 from aobake.batch.supervisor import Event, Stop, Supervisor
 from aobake.batch.tasks import Capacity, Outcome, Task
@@ -21,7 +20,7 @@ __all__ = ["LocalExecutor"]
 TYPICAL_BYTES = 512 << 20  # of a process and a small asset, for how many processes there may be
 
 
-class LocalExecutor:
+class LocalExecutor(Closing):
     """Runs tasks in worker processes on this machine. It is to be closed, or used as a context."""
 
     def __init__(
@@ -91,14 +90,3 @@ class LocalExecutor:
         """End all processes, and remove what they had not finished writing."""
         self._events.put(None)
         self._thread.join()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

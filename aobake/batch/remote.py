@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import posixpath
-import re
 import secrets
 import urllib.parse
 from collections.abc import Callable, Iterator, Mapping
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from aobake.batch.places import Found, Place, Stamp, local_folder
 from aobake.errors import AobakeError, InputError, OutputError, SettingsError, nearest
+from aobake.files import PART, is_unfinished
 
 if TYPE_CHECKING:
     import fsspec
@@ -29,11 +29,10 @@ MARKS = (
     "ETag", "etag", "md5Hash", "content_md5", "mtime", "LastModified", "last_modified", "updated",
     "modified", "created",
 )  # fmt: skip
-# Stores in which an upload shows nothing before it is complete; elsewhere it gets its name afterwards.
-WHOLE_AT_ONCE = {"s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "oci", "oss", "memory"}
+# Stores of objects: an upload shows nothing before it is complete, where elsewhere it gets its name afterwards.
+OBJECT_STORES = {"s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "oci", "oss", "memory"}
 USUAL = ("az", "gs", "hdfs", "s3", "sftp", "smb", "webdav")  # that fsspec knows, of many more
 PIECE = 1 << 20
-LEFT = re.compile(r"\.aobake-[0-9a-z_-]+\.part")  # names of unfinished files, and no others
 CURE = "Check the address, and that this machine may use it (docs/cluster.md)."
 
 
@@ -67,6 +66,11 @@ class RemoteFolder:
         self._protocol = url.partition("://")[0]
         self._files, path = _opened(self.name, self.options)
         self._path = path.rstrip("/")
+
+    @property
+    def lists_all(self) -> bool:
+        """Whether it is a store of objects, which has no links; sftp has."""
+        return self._protocol in OBJECT_STORES
 
     @property
     def mirror(self) -> Path:
@@ -143,7 +147,7 @@ class RemoteFolder:
         Raises InputError, and OutputError where something stays.
         """
         names = [found.name for found in self.files(lambda _: True)]
-        left = tuple(name for name in names if LEFT.fullmatch(posixpath.basename(name)))
+        left = tuple(name for name in names if is_unfinished(posixpath.basename(name)))
         for name in left:
             self.remove(name)
         return left
@@ -177,11 +181,11 @@ class RemoteFolder:
         """The path to write to, so that nothing stands under a name before it is complete."""
         full = self._full(name)
         folder = posixpath.dirname(full)
-        if self._protocol in WHOLE_AT_ONCE:
+        if self._protocol in OBJECT_STORES:
             yield full
             return
         self._files.makedirs(folder, exist_ok=True)
-        part = f"{folder}/.aobake-{secrets.token_hex(8)}.part"
+        part = f"{folder}/{PART}{secrets.token_hex(4)}.part"
         try:
             yield part
             self._files.mv(part, full)

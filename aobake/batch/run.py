@@ -7,6 +7,7 @@ All that lasts is in the manifest, one transaction a job: whenever this is kille
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -27,17 +28,18 @@ from aobake.batch.settings import BatchSettings
 from aobake.batch.standing import Standing
 from aobake.batch.summary import RunFacts, Totals, totals_of, write_json
 from aobake.batch.tasks import Executor, Outcome, Planned, Remote, Task
-from aobake.batch.tree import STATE
-from aobake.errors import OutputError
+from aobake.errors import AobakeError
+from aobake.files import make_folder
 from aobake.jobs import Reading
 
-__all__ = ["STATE", "Batch", "Ended", "Pairs", "Reports", "compare", "run_batch"]
+__all__ = ["Batch", "Ended", "Pairs", "Reports", "compare", "run_batch"]
 
 POLL_S = 0.25  # how often the watcher hears that time passes
 NOT_BEGUN = "the batch was stopped before it was begun"
 AGAIN = {"crashed", "memory", "timeout"}  # what a second attempt may cure
 
 Pairs = list[tuple[Planned, Standing]]
+Costed = list[tuple[Planned, Cost]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +119,7 @@ def run_batch(
     began = datetime.now(UTC)
     stop = stop or threading.Event()
     planned = _planned(batch)
-    _make(batch.state)
+    make_folder(batch.state)
     with hold(batch.state / "lock", command=batch.command):
         leftovers = _tidied(batch.target)
         with Manifest.open(batch.state / "batch.sqlite", batch.source, batch.target) as manifest:
@@ -154,15 +156,6 @@ def _planned(batch: Batch) -> list[Planned]:
     return [replace(one, job=replace(one.job, reading=batch.reading)) for one in found]
 
 
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"{folder}: this folder cannot be made ({error.strerror or error})."
-        ) from error
-
-
 def _tidied(target: Place) -> tuple[str, ...]:
     """What a killed run left in a target, which is removed."""
     if isinstance(target, RemoteFolder):
@@ -170,8 +163,8 @@ def _tidied(target: Place) -> tuple[str, ...]:
     return remove_leftovers(target.path(""))
 
 
-def _settled(batch: Batch, manifest: Manifest, pairs: Pairs, watcher: Watcher) -> Pairs:
-    """Note what needs no bake, reuse what was moved; what is left to bake."""
+def _settled(batch: Batch, manifest: Manifest, pairs: Pairs, watcher: Watcher) -> Costed:
+    """Note what needs no bake, reuse what was moved; what is left to bake, numbered."""
     refused = [(job, standing) for job, standing in pairs if standing.kind == "refused"]
     others = [(job, standing) for job, standing in pairs if standing.kind != "refused"]
     if batch.force:
@@ -182,15 +175,14 @@ def _settled(batch: Batch, manifest: Manifest, pairs: Pairs, watcher: Watcher) -
         to_bake = [pair for pair in others if pair[1].to_bake] + list(again)
     manifest.note([job for job, _ in refused], "failed")
     skipped = len(others) - len(to_bake)
-    cost = sum(_cost(number, pair).seconds for number, pair in enumerate(to_bake))
-    watcher.planned(len(pairs), skipped, cost)
+    costed = [(pair[0], _cost(number, *pair)) for number, pair in enumerate(to_bake)]
+    watcher.planned(len(pairs), skipped, sum(cost.seconds for _, cost in costed))
     for job, _ in refused:
         watcher.refused(job.source, job.refused)
-    return to_bake
+    return costed
 
 
-def _cost(number: int, pair: tuple[Planned, Standing]) -> Cost:
-    planned, standing = pair
+def _cost(number: int, planned: Planned, standing: Standing) -> Cost:
     return estimated(
         number, planned.job, planned.size, seconds=standing.seconds, peak=standing.peak_bytes
     )
@@ -211,16 +203,25 @@ class _Run:
         self._watcher, self._stop = watcher, stop
         self._schedule = Schedule()
         self._attempts: dict[int, int] = {}
-        self._costs: dict[int, Cost] = {}
         self._settled: set[int] = set()
         self._jobs: Sequence[Planned] = ()
+        self._costs: Sequence[Cost] = ()
 
-    def bake(self, pairs: Pairs) -> None:
+    def bake(self, costed: Costed) -> None:
         """Start tasks as there is room for them, and record what becomes of each."""
-        self._jobs = [planned for planned, _ in pairs]
-        for number, pair in enumerate(pairs):
-            self._costs[number] = _cost(number, pair)
-            self._schedule.add(self._costs[number])
+        self._jobs = [planned for planned, _ in costed]
+        self._costs = [cost for _, cost in costed]
+        for cost in self._costs:
+            self._schedule.add(cost)
+        try:
+            self._until_done()
+        except Exception:
+            # The executor may be used for another run, which must hear nothing of the tasks of this one.
+            with contextlib.suppress(AobakeError):
+                self._executor.stop(0.0)
+            raise
+
+    def _until_done(self) -> None:
         self._start_some()
         while (self._schedule.pending or self._schedule.running) and not self._stop.is_set():
             outcomes = self._executor.finished(POLL_S)

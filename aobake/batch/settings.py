@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from aobake.checks import check_choice, check_whole, check_words
 from aobake.config import COMMANDS, Command
-from aobake.errors import SettingsError, nearest
+from aobake.errors import SettingsError
 from aobake.patterns import pattern
 
 __all__ = ["BatchSettings", "Pictures", "Tiles"]
@@ -78,14 +78,14 @@ class BatchSettings:
         for name in ("only", "skip"):
             object.__setattr__(self, name, _patterns(name, getattr(self, name)))
         if self.processes is not None:
-            _whole("processes", self.processes, 1, MOST_PROCESSES)
+            check_whole("processes", self.processes, 1, MOST_PROCESSES)
         _ = self.memory_bytes
         if self.timeout is not None:
             _seconds("timeout", self.timeout, above_0=True)
-        _whole("retries", self.retries, 0, MOST_RETRIES)
+        check_whole("retries", self.retries, 0, MOST_RETRIES)
         _seconds("grace", self.grace, above_0=False)
-        _choice("pictures", self.pictures, get_args(Pictures))
-        _choice("tiles", self.tiles, get_args(Tiles))
+        check_choice("pictures", self.pictures, get_args(Pictures))
+        check_choice("tiles", self.tiles, get_args(Tiles))
 
     @property
     def memory_bytes(self) -> int | None:
@@ -112,7 +112,7 @@ class BatchSettings:
         if not isinstance(several, list | tuple) or not several:
             raise SettingsError(f"bake is {given!r}; {' or '.join(COMMANDS)}, or both, is needed.")
         for word in several:
-            _choice("bake", word, COMMANDS)
+            check_choice("bake", word, COMMANDS)
         object.__setattr__(self, "bake", tuple(word for word in COMMANDS if word in several))
 
     def _settle_format(self) -> None:
@@ -125,27 +125,18 @@ class BatchSettings:
 
 
 def _patterns(name: str, given: object) -> tuple[str, ...]:
-    several = [given] if isinstance(given, str) else given
-    if not isinstance(several, list | tuple) or not all(isinstance(word, str) for word in several):
-        raise SettingsError(f"{name} is {given!r}; patterns are needed.")
+    several = check_words(name, given)
     for words in several:
         try:
             pattern(words)
         except SettingsError as error:
             raise SettingsError(f"{name} {error}") from error
-    return tuple(several)
+    return several
 
 
 def _word(name: str, given: object, needed: str) -> None:
     if given is not None and not isinstance(given, str):
         raise SettingsError(f"{name} is {given!r}; {needed} is needed.")
-
-
-def _whole(name: str, value: object, least: int, most: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise SettingsError(
-            f"{name} is {value!r}; a whole number from {least} to {most} is needed."
-        )
 
 
 def _seconds(name: str, value: object, *, above_0: bool) -> None:
@@ -154,8 +145,3 @@ def _seconds(name: str, value: object, *, above_0: bool) -> None:
         raise SettingsError(
             f"{name} is {value!r}; seconds{' above 0' if above_0 else ''} are needed."
         )
-
-
-def _choice(name: str, value: object, known: Collection[str]) -> None:
-    if value not in known:
-        raise SettingsError(f"{name} is {value!r}.{nearest(value, known)}")

@@ -45,14 +45,13 @@ Event = Task | Stop | Heard | None
 class Member:
     """A worker and what it is at.
 
-    part : how the names of its unfinished files begin; '' while it is starting, which is not counted as time
-    task, since : what it does, and the moment at which it began; None where it is idle
+    task, since : what it does, and the moment at which it began; None where it is idle. To start a process and
+        to compile kernels is not counted as time
     until, then : the moment at which its task is ended, and what has become of it in that case
     ended : the same, once it was ended
     """
 
     child: Child
-    part: str = ""
     task: Task | None = None
     since: float = 0.0
     until: float = math.inf
@@ -128,8 +127,7 @@ class Supervisor:
 
     def _answered(self, member: Member, answer: Ready | Outcome | None) -> None:
         match answer:
-            case Ready(part):
-                member.part = part
+            case Ready():
                 member.begin(time.monotonic())
             case Outcome():
                 self._outcomes.put(replace(answer, peak_bytes=max(answer.peak_bytes, member.peak)))
@@ -178,10 +176,8 @@ class Supervisor:
         return self._members[child]
 
     def _give(self, member: Member, task: Task) -> None:
-        now = time.monotonic()
-        member.task, member.since, member.until, member.peak = task, now, math.inf, 0
-        if member.part:
-            member.begin(now)
+        member.task, member.since = task, time.monotonic()
+        member.until, member.peak = math.inf, 0
         member.child.give(task)
 
     def _stop(self, until: float) -> None:
@@ -209,8 +205,8 @@ class Supervisor:
         """End a worker, and remove the files that it had not finished writing."""
         del self._members[member.child]
         member.child.close()
-        if member.task and member.part:
-            for left in member.task.job.output.parent.glob(f"{member.part}*.part"):
+        if member.task and member.child.part:
+            for left in member.task.job.output.parent.glob(f"{member.child.part}*.part"):
                 with contextlib.suppress(OSError):
                     left.unlink()
 

@@ -12,9 +12,9 @@ import itertools
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from types import TracebackType
-from typing import Literal, Self
+from typing import Literal
 
+from aobake.batch.closing import Closing
 from aobake.batch.parts import Part, Step, first_part
 from aobake.batch.tasks import Capacity, Executor, Outcome, Task
 from aobake.errors import AobakeError
@@ -48,7 +48,7 @@ class _Cut:
         return max(0, len(self.under_way) * self.threads - self.task.threads)
 
 
-class TiledExecutor:
+class TiledExecutor(Closing):
     """Hands tasks on to another executor, textures in parts where that has several workers."""
 
     def __init__(self, inner: Executor, tiles: Literal["auto", "on", "off"] = "auto") -> None:
@@ -104,17 +104,6 @@ class TiledExecutor:
         for cut in self._under_way():
             _clear(cut)
         self._cuts.clear()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _under_way(self) -> list[_Cut]:
         return list({id(cut): cut for cut in self._cuts.values()}.values())

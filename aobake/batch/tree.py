@@ -32,8 +32,10 @@ class Tree:
             self._unread.append("")
 
     def stamp(self, name: str) -> Stamp | None:
-        """The stamp of a file when the walk came by; what it did not meet is looked for now. None: not there."""
-        return self._stamps.get(name) or self._place.stamp(name)
+        """The stamp of a file when the walk came by; what it could miss is looked for now. None: not there."""
+        seen = self.seen(name)
+        whole = self._place.lists_all and not self._unread
+        return seen if seen or whole else self._place.stamp(name)
 
     def seen(self, name: str) -> Stamp | None:
         """The stamp of a file when the walk came by; None where it met none."""

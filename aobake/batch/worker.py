@@ -25,8 +25,9 @@ from typing import BinaryIO
 
 from aobake import files
 from aobake.batch import limits, parts
+from aobake.batch.compiling import compile_for
 from aobake.batch.tasks import Outcome, Status, Task
-from aobake.errors import AobakeError, OutputError
+from aobake.errors import AobakeError
 from aobake.jobs import Done, Job, run_job
 
 __all__ = ["Ready", "serve", "work"]
@@ -34,7 +35,7 @@ __all__ = ["Ready", "serve", "work"]
 
 @dataclass(frozen=True)
 class Ready:
-    """The first word of a worker: it takes tasks now. part : how the names of its unfinished files begin."""
+    """What a worker says when it begins a task. part : how the names of its unfinished files begin."""
 
     part: str
 
@@ -70,9 +71,12 @@ def serve(do: Callable[[Task], Outcome] = work) -> None:
     waiting: queue.SimpleQueue[Task] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(tasks, waiting), daemon=True).start()
     _load()
-    _say(answers, Ready(files.PART))
     while True:
-        answer = do(waiting.get())
+        task = waiting.get()
+        if task.timeout is not None:
+            compile_for(task)
+        _say(answers, Ready(files.PART))
+        answer = do(task)
         _tidy_up()
         _say(answers, answer)
 
@@ -85,7 +89,7 @@ def _baked(task: Task) -> Outcome:
     asked = task.job.chosen.bake
     chosen = replace(task.job.chosen, bake=replace(asked, threads=task.threads))
     job = replace(task.job, chosen=chosen)
-    _make_folder(job.output)
+    files.make_folder(job.output.parent, needed_by=str(job.output))
     if task.part is None or task.target is None:
         return _outcome(task, run_job(job))
     if task.part.step == "join":
@@ -125,14 +129,6 @@ def _absent(job: Job) -> Iterator[str]:
             yield path
 
 
-def _make_folder(output: Path) -> None:
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        why = error.strerror or error
-        raise OutputError(f"{output}: its folder cannot be made ({why}).") from error
-
-
 def _pictures(task: Task, done: Done) -> tuple[Mapping[str, bytes], Sequence[str]]:
     """The pictures of a task, and what to say where there are none."""
     from aobake.batch.pictures import pictures_of
@@ -170,9 +166,9 @@ def _bug(error: Exception) -> str:
 def _load() -> None:
     """Import what every bake needs."""
     from aobake import bake, results  # noqa: F401 - for the tasks to come
-    from aobake.tracing.compiled import import_without_blas
+    from aobake.tracing.compiled import compile_alone
 
-    import_without_blas()
+    compile_alone()
     _tidy_up()
 
 

@@ -23,7 +23,7 @@ from aobake.cli.batching import (
     tell,
 )
 from aobake.cli.options import BakeFlags
-from aobake.cli.output import make_folder
+from aobake.files import make_folder
 from aobake.flags import changed_settings, command_line
 
 if TYPE_CHECKING:

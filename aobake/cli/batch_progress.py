@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import PurePath
 
 from aobake.batch import progress
 from aobake.batch.progress import Progress, Running, Watcher
@@ -14,22 +16,23 @@ from aobake.cli import terminal
 
 __all__ = ["lines_of", "standing", "watching"]
 
+Tell = Callable[[str], None]
+
 MOST_SHOWN = 8  # running assets
 LONGEST_NAME = 56
 BETWEEN_LINES_S = 10.0
+MOST_ALIKE = 3  # failures of one kind that are told of one by one
 
 
 @contextlib.contextmanager
 def watching(*, quiet: bool, clock: Callable[[], float] = time.monotonic) -> Iterator[Watcher]:
     """A watcher of a batch that shows what it is told, on stderr.
 
-    quiet : nothing but failures, which are always told, a line each, as they happen
+    quiet : nothing but failures, which are always told, a line each, as they happen; of those that differ in
+    nothing but the asset the first three, and at the end how many more there were
     """
-    if quiet:
-        yield _Watching(clock, draw=None, between_s=None)
-        return
-    with terminal.live_lines() as draw:
-        between_s = BETWEEN_LINES_S if draw is None else None
+    with contextlib.nullcontext() if quiet else terminal.live_lines() as draw:
+        between_s = BETWEEN_LINES_S if draw is None and not quiet else None
         watcher = _Watching(clock, draw=draw, between_s=between_s)
         yield watcher
         watcher.close()
@@ -70,6 +73,8 @@ class _Watching:
     state: Progress = field(default_factory=Progress)
     said: str = ""
     said_at: float = 0.0
+    failures: Counter[tuple[Tell, str]] = field(default_factory=Counter)
+    assets: dict[int, str] = field(default_factory=dict)
 
     def planned(self, total: int, skipped: int, cost: float) -> None:
         self.said_at = self.clock()
@@ -77,17 +82,19 @@ class _Watching:
 
     def refused(self, source: str, reason: str) -> None:
         self.state = progress.refused(self.state)
-        terminal.error(reason or source)
+        self._tell(source, reason or source, terminal.error)
 
     def started(self, task: Task, cost: float) -> None:
         self.state = progress.started(self.state, task, cost, self.clock())
+        self.assets[task.number] = task.job.input.name
 
     def ended(self, outcome: Outcome, *, again: bool = False) -> None:
         self.state = progress.ended(self.state, outcome, again=again)
+        asset = self.assets.pop(outcome.number, "")
         if again:
-            terminal.warn([f"{outcome.reason} It is tried again."], "")
+            self._tell(asset, f"{outcome.reason} It is tried again.", terminal.warning)
         elif outcome.status not in {"done", "stopped"}:
-            terminal.error(outcome.reason)
+            self._tell(asset, outcome.reason, terminal.error)
 
     def stopping(self, running: int, grace: float) -> None:
         told = self.draw is not None or self.between_s is not None
@@ -105,16 +112,32 @@ class _Watching:
             self._say(now)
 
     def close(self) -> None:
-        """Say where it ended, where lines are said and it came to an end."""
+        """Say how many failures were not told of, and where it ended if lines are said and it came to an end."""
+        for (tell, finding), count in self.failures.items():
+            if count > MOST_ALIKE:
+                tell(f"and {count - MOST_ALIKE:,} more, which the report names: {finding}")
         ran = self.state.settled > self.state.skipped and self.state.settled == self.state.total
         if self.between_s is not None and ran and not self.state.stopped:
             self._say(self.clock())
+
+    def _tell(self, asset: str, reason: str, tell: Tell) -> None:
+        """Tell of a failure, unless enough like it were told of."""
+        kind = tell, _finding(reason, asset)
+        self.failures[kind] += 1
+        if self.failures[kind] <= MOST_ALIKE:
+            tell(reason)
 
     def _say(self, now: float) -> None:
         line = standing(self.state, now)
         if line != self.said:
             terminal.note(line)
         self.said, self.said_at = line, now
+
+
+def _finding(reason: str, asset: str) -> str:
+    """A reason without the file that it begins with; the whole of one that does not begin with the asset."""
+    file, colon, finding = reason.partition(": ")
+    return finding if colon and asset and PurePath(file).name == PurePath(asset).name else reason
 
 
 def _row(task: Running, now: float) -> str:

@@ -71,7 +71,8 @@ def batch_of(
 ) -> Batch:
     """The batch that flags ask for. Raises SettingsError, and OutputError for reports that cannot be written."""
     from aobake.batch.remote import place_of
-    from aobake.batch.run import STATE, Batch, Reports
+    from aobake.batch.run import Batch, Reports
+    from aobake.batch.tree import STATE
     from aobake.jobs import Reading
 
     remote = "://" in output

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from aobake.cli import terminal
 from aobake.cli.options import AtlasFlags, CommonOptions, Output, TraceFlags
-from aobake.cli.output import check_target, make_folder
+from aobake.cli.output import check_target
 from aobake.config import Configured, configured
+from aobake.files import make_folder
 
 __all__ = ["demo"]
 
@@ -60,7 +61,7 @@ def demo(
 
 def _bake(folder: Path, chosen: Configured, common: CommonOptions) -> None:
     """The scene with its occlusion at vertices, and with a lightmap."""
-    from aobake.cli.work import do_in_memory
+    from aobake.cli.work import bake_in_memory
     from aobake.demo import hall
     from aobake.jobs import Job
 
@@ -80,8 +81,8 @@ def _bake(folder: Path, chosen: Configured, common: CommonOptions) -> None:
         output=folder / LIGHTMAP,
         chosen=dataclasses.replace(chosen, bake=few),
     )
-    do_in_memory(scene, colors, common)
-    do_in_memory(scene, lightmap, dataclasses.replace(common, report=None))
+    bake_in_memory(scene, colors, common)
+    bake_in_memory(scene, lightmap, dataclasses.replace(common, report=None))
 
 
 def _show(folder: Path, chosen: Configured, *, quiet: bool) -> None:

@@ -9,7 +9,7 @@ from aobake import OutputError, SettingsError
 from aobake.errors import nearest
 from aobake.files import check_writable, same_file
 
-__all__ = ["check_asset_target", "check_target", "make_folder"]
+__all__ = ["check_asset_target", "check_target"]
 
 
 def check_target(path: Path, *, force: bool, inputs: Sequence[Path] = ()) -> None:
@@ -43,16 +43,3 @@ def check_asset_target(
         own = any(read.suffix.lower() == suffix for read in inputs)  # the asset is at odds with it
         raise OutputError(message) if own else SettingsError(message)
     check_target(path, force=force, inputs=inputs)
-
-
-def make_folder(path: Path) -> bool:
-    """Make a folder unless it is there; whether it was made. Raises OutputError."""
-    if path.is_dir():
-        return False
-    try:
-        path.mkdir(parents=True)
-    except OSError as error:
-        raise OutputError(
-            f"{path}: this folder cannot be made ({error.strerror or error})."
-        ) from error
-    return True

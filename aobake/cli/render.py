@@ -131,9 +131,9 @@ def _about(asset: Path, message: str) -> str:
 
 def _check(wanted: _Wanted, output: Path) -> None:
     """Raise SettingsError now for a picture that could not be drawn, or not be written."""
-    from aobake.tracing.compiled import import_without_blas
+    from aobake.tracing.compiled import compile_alone
 
-    import_without_blas()  # before anything asks for kernels
+    compile_alone()  # before anything asks for kernels
     from aobake.images import ENCODINGS, KINDS
     from aobake.previews import check_comparison
     from aobake.shading.preview import check

@@ -20,6 +20,7 @@ __all__ = [
     "say_names",
     "tables",
     "warn",
+    "warning",
 ]
 
 Progress = Callable[[str, int, int], None]
@@ -41,13 +42,18 @@ def error(message: str) -> None:
     _to_stderr("error", message)
 
 
+def warning(message: str) -> None:
+    """One line on stderr that says what is not as it should be."""
+    _to_stderr("warning", message)
+
+
 def warn(messages: Sequence[str], more: str) -> None:
     """One line on stderr for each warning; of many, the first ones and how many more, and where they are."""
     shown = messages if len(messages) <= MOST_WARNINGS else messages[: MOST_WARNINGS - 1]
     for message in shown:
-        _to_stderr("warning", message)
+        warning(message)
     if len(shown) < len(messages):
-        _to_stderr("warning", f"and {len(messages) - len(shown)} more{more}.")
+        warning(f"and {len(messages) - len(shown)} more{more}.")
 
 
 def note(message: str) -> None:

@@ -61,19 +61,7 @@ def texture(
     if common.report is not None:
         check_target(common.report, force=common.force)
 
-    from aobake.cli.work import as_read, do
-    from aobake.jobs import Job
+    from aobake.cli.work import bake_file
 
-    reading = as_read(source)
-    do(
-        Job(
-            command="texture",
-            input=input,
-            output=output,
-            chosen=chosen,
-            reading=reading,
-            force=common.force,
-        ),
-        common,
-    )
+    bake_file("texture", input, output, chosen=chosen, source=source, common=common)
     return 0

@@ -53,19 +53,7 @@ def vertex(
     if common.report is not None:
         check_target(common.report, force=common.force)
 
-    from aobake.cli.work import as_read, do
-    from aobake.jobs import Job
+    from aobake.cli.work import bake_file
 
-    reading = as_read(source)
-    do(
-        Job(
-            command="vertex",
-            input=input,
-            output=output,
-            chosen=chosen,
-            reading=reading,
-            force=common.force,
-        ),
-        common,
-    )
+    bake_file("vertex", input, output, chosen=chosen, source=source, common=common)
     return 0

@@ -21,6 +21,7 @@ from aobake.cli.batching import (
     tell,
 )
 from aobake.cli.options import BakeFlags
+from aobake.files import is_unfinished
 
 if TYPE_CHECKING:
     from aobake.batch.run import Batch
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 __all__ = ["watch"]
 
 LOOK_MS = 500  # how often it is looked whether to stop
-PARTS = ".aobake-"  # how the names of all files begin that are not complete yet
 SETTLED_MS = 400  # without a change, before what changed is baked: exporters write in several steps
 
 
@@ -131,6 +131,6 @@ def changes(folder: Path, ours: Sequence[Path], stop: threading.Event) -> Iterat
 def counts(path: str, ours: Sequence[Path]) -> bool:
     """Whether a change of a file is one to bake for. ours : files and folders of which none is"""
     where = Path(os.path.realpath(path))
-    if where.name.startswith(PARTS):
+    if is_unfinished(where.name):
         return False
     return not any(where.is_relative_to(os.path.realpath(one)) for one in ours)

@@ -5,22 +5,39 @@ from __future__ import annotations
 from pathlib import Path
 
 from aobake import Scene, jobs, report
+from aobake.ahead import compile_ahead
 from aobake.cli import terminal
 from aobake.cli.leaving import leaving_promptly
 from aobake.cli.options import CommonOptions, SourceOptions
-from aobake.tracing.ahead import compile_ahead
+from aobake.config import Command, Configured
 
-__all__ = ["as_read", "do", "do_in_memory"]
-
-
-def as_read(source: SourceOptions) -> jobs.Reading:
-    """How the flags say that a file is read."""
-    return jobs.Reading(scene=source.scene, pose=source.pose, root=source.root)
+__all__ = ["bake_file", "bake_in_memory"]
 
 
-def do(job: jobs.Job, common: CommonOptions) -> None:
-    """Do a job, write the report that was asked for, and say what was done unless told to be quiet."""
-    compile_ahead()
+def bake_file(
+    command: Command,
+    input: Path,
+    output: Path,
+    *,
+    chosen: Configured,
+    source: SourceOptions,
+    common: CommonOptions,
+) -> None:
+    """Bake a file, write the report that was asked for, and say what was done unless told to be quiet."""
+    reading = jobs.Reading(scene=source.scene, pose=source.pose, root=source.root)
+    job = jobs.Job(
+        command=command,
+        input=input,
+        output=output,
+        chosen=chosen,
+        reading=reading,
+        force=common.force,
+    )
+    _do(job, common)
+
+
+def _do(job: jobs.Job, common: CommonOptions) -> None:
+    compile_ahead(job.command)
     with terminal.progress_bar(quiet=common.quiet) as progress:
         done = jobs.run_job(
             job, digests=common.report is not None, progress=progress, guard=leaving_promptly
@@ -28,9 +45,9 @@ def do(job: jobs.Job, common: CommonOptions) -> None:
     _tell(job, done.report, common)
 
 
-def do_in_memory(scene: Scene, job: jobs.Job, common: CommonOptions) -> None:
+def bake_in_memory(scene: Scene, job: jobs.Job, common: CommonOptions) -> None:
     """The same for a scene that is in no file."""
-    compile_ahead()
+    compile_ahead(job.command)
     with terminal.progress_bar(quiet=common.quiet) as progress:
         done = jobs.bake_scene(
             scene,

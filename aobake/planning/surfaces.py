@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -84,12 +83,14 @@ def _denoise(settings: BakeSettings) -> Effect:
 
     Half the error by rays costs 2.5 times their seconds; the denoiser costs what 50 rays a texel do.
     """
+    from aobake.atlas.denoise import available  # heavy: vertices do without
+
     if settings.denoise != "auto":
         return Effect(settings.denoise == "on", f"denoise is {settings.denoise}.", 1.2)
     expected = settings.tolerance or NOISE * settings.rays**-0.75
     if expected <= VISIBLE_NOISE:
         return Effect(False, f"A standard error of about {expected:.4f} does not show in 8 bits.")
-    if importlib.util.find_spec("pyoidn") is None:
+    if not available():
         return Effect(False, "It would pay, but pyoidn is not installed (aobake[denoise]).")
     return Effect(
         True, f"A standard error of about {expected:.4f} costs less to smooth than to trace.", 1.2

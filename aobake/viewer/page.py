@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import html
 import string
 from collections.abc import Sequence
@@ -12,6 +11,7 @@ from importlib.resources import files
 from aobake import __version__
 from aobake.errors import OutputError
 from aobake.meshes.formats.gltf.container import Bytes
+from aobake.standalone import hash_source, policy
 
 __all__ = ["page_of", "shared_scripts"]
 
@@ -42,9 +42,14 @@ def page_of(
     parts = ["draco", "viewer"] if DRACO in _json_of(glb) else ["viewer"]
     style = _text("page.css")
     scripts, allowed = _scripts(parts, scripts_in)
+    rules = policy(
+        scripts=[*allowed, "'wasm-unsafe-eval'"],  # decoders are WebAssembly
+        styles=[hash_source(style)],
+        images=["blob:", "data:"],  # of its own making
+    )
     licences = [_vendored(f"{part}.licences.txt") for part in parts if scripts_in is None]
     text = string.Template(_text("page.html")).substitute(
-        policy=html.escape(_policy(allowed, style)),
+        policy=html.escape(rules),
         version=html.escape(__version__),
         name=html.escape(name),
         facts=html.escape(" · ".join(facts)),
@@ -73,23 +78,11 @@ def _scripts(parts: Sequence[str], folder: str | None) -> tuple[list[str], list[
     """The elements of the scripts, and what the policy has to allow for them."""
     if folder is None:
         code = [_vendored(f"{part}.min.js") for part in parts]
-        return [f"<script>{script}</script>" for script in code], [_hash(script) for script in code]
+        allowed = [hash_source(script) for script in code]
+        return [f"<script>{script}</script>" for script in code], allowed
     # A file beside the page is the page's own, also where it is opened from a disk.
     sources = [html.escape(f"{folder}{part}.min.js") for part in parts]
     return [f'<script src="{source}"></script>' for source in sources], ["'self'"]
-
-
-def _policy(scripts: Sequence[str], style: str) -> str:
-    """What the page may do: run these scripts and their WebAssembly, and show images of its own making."""
-    return (
-        f"default-src 'none'; script-src {' '.join(scripts)} 'wasm-unsafe-eval'; style-src {_hash(style)}; "
-        "img-src blob: data:; base-uri 'none'; form-action 'none'"
-    )
-
-
-def _hash(text: str) -> str:
-    digest = hashlib.sha256(text.encode("utf-8")).digest()
-    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
 
 
 def _text(name: str) -> str:

@@ -8,7 +8,7 @@ from aobake import BakeSettings, Instance, Scene, bake_texture
 from aobake.atlas.buried import lit_rims
 from aobake.atlas.lookup import sample
 from aobake.meshes.scene import Attribute, Mesh
-from tests.scenes import box, patch
+from tests.scenes import box, mesh_of, patch
 
 CHART = np.zeros((5, 5), np.int32)
 ERROR = np.full((5, 5), 0.01, np.float32)
@@ -57,7 +57,7 @@ def test_a_box_that_is_sunk_into_the_floor_has_no_black_outline() -> None:
     )
     sunk = box((-0.49, -0.49, -0.4), (0.49, 0.49, 0.4))
     scene = Scene(
-        meshes=(below, Mesh(vertices=sunk.vertices, faces=sunk.faces)),
+        meshes=(below, mesh_of(sunk)),
         instances=(Instance(mesh=0), Instance(mesh=1)),
     )
     baked = bake_texture(scene, BakeSettings(size=64, rays=256, atlas="mesh", denoise="off"))

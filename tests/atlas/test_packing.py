@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from aobake.atlas.packing import Packed, pack
 from aobake.atlas.unwrap import Charts, unwrap
 from aobake.errors import InputError
-from aobake.meshes.scene import FloatArray, Mesh
+from aobake.meshes.scene import FloatArray
 from aobake.settings import AtlasSettings
-from tests.scenes import Triangles, box, icosphere, joined, moved, patch, tube
+from tests.scenes import Triangles, box, icosphere, joined, mesh_of, moved, patch, tube
 
 SLACK = 1e-5  # texels: what rounding may push a corner over a line
 
 
 def charts_of(shape: Triangles) -> Charts:
-    return unwrap([Mesh(vertices=shape.vertices, faces=shape.faces)], AtlasSettings(), threads=2)[0]
+    return unwrap([mesh_of(shape)], AtlasSettings(), threads=2)[0]
 
 
 def cards(count: int, seed: int = 3) -> Triangles:

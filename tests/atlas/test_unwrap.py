@@ -12,7 +12,7 @@ from aobake.atlas import partition
 from aobake.atlas.charts import mended
 from aobake.atlas.dual import dual_of
 from aobake.atlas.unwrap import Charts, unwrap
-from aobake.meshes.scene import FloatArray, Mesh
+from aobake.meshes.scene import FloatArray
 from aobake.settings import AtlasSettings
 from tests.scenes import (
     Triangles,
@@ -21,6 +21,7 @@ from tests.scenes import (
     flipped,
     icosphere,
     joined,
+    mesh_of,
     moved,
     patch,
     subdivided,
@@ -29,12 +30,8 @@ from tests.scenes import (
 )
 
 
-def mesh(shape: Triangles) -> Mesh:
-    return Mesh(vertices=shape.vertices, faces=shape.faces)
-
-
 def unwrapped(shape: Triangles, *, threads: int = 2, timeout: float = 300.0) -> Charts:
-    return unwrap([mesh(shape)], AtlasSettings(unwrap_timeout=timeout), threads=threads)[0]
+    return unwrap([mesh_of(shape)], AtlasSettings(unwrap_timeout=timeout), threads=threads)[0]
 
 
 def signed_areas(corners: FloatArray) -> FloatArray:
@@ -242,7 +239,7 @@ def test_nothing_to_unwrap_gives_nothing() -> None:
 
 def test_progress_counts_every_face_once_and_may_stop_the_work() -> None:
     seen: list[tuple[int, int]] = []
-    shapes = [mesh(box()), mesh(icosphere(4)), mesh(torus())]
+    shapes = [mesh_of(box()), mesh_of(icosphere(4)), mesh_of(torus())]
     unwrap(shapes, AtlasSettings(), progress=lambda done, total: seen.append((done, total)))
     total = sum(len(m.faces) for m in shapes)
     assert seen[-1] == (total, total)

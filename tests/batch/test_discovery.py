@@ -191,10 +191,14 @@ def test_an_asset_is_baked_as_it_would_be_alone(
 
 @dataclass(frozen=True)
 class Elsewhere:
-    """A place that is not on this machine: names and contents."""
+    """A place that is not on this machine: names and contents.
+
+    What raises NotImplementedError costs a store a request for each file: a plan must not come to ask for it.
+    """
 
     name: str
     contents: Mapping[str, str]
+    lists_all: bool = True
 
     def files(self, enters: Callable[[str], bool]) -> Iterator[Found]:
         for name in sorted(self.contents):
@@ -203,7 +207,7 @@ class Elsewhere:
                 yield Found(name=name, stamp=Stamp(len(self.contents[name]), ""))
 
     def stamp(self, name: str) -> Stamp | None:
-        raise NotImplementedError(name)  # this and what follows is not asked for by a plan
+        raise NotImplementedError(name)
 
     def read(self, name: str, most: int) -> bytes:
         return self.contents[name].encode()[:most]

@@ -124,6 +124,17 @@ def test_what_takes_too_long_is_ended_and_leaves_nothing(
     assert list(tmp_path.glob("*.part")) == [neighbour]
 
 
+def test_the_time_of_a_task_counts_from_when_its_kernels_are_compiled(
+    executor: LocalExecutor, tmp_path: Path
+) -> None:
+    executor.start(task(0, "compile_slowly.glb", tmp_path, timeout=0.2))
+    wait_for((tmp_path / "compile_slowly.begun").exists)
+    assert executor.finished(0.6) == []
+    (tmp_path / "compile_slowly.word").touch()
+    found: list[Outcome] = []
+    wait_for(lambda: bool(found.__iadd__(executor.finished(0.1))))
+
+
 @pytest.mark.parametrize("name", ["hog.glb", pytest.param("gulp.glb", marks=linux)])
 def test_what_takes_too_much_memory_is_ended(
     executor: LocalExecutor, tmp_path: Path, name: str

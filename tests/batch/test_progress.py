@@ -6,7 +6,7 @@ import contextlib
 import os
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -150,6 +150,26 @@ def test_quiet_tells_failures_alone(capfd: pytest.CaptureFixture[str]) -> None:
         clock.now += 60.0
         watcher.tick()
     assert capfd.readouterr().err == "aobake: error: 1.glb: it is broken.\n"
+
+
+def test_of_failures_that_differ_in_the_asset_alone_the_first_are_told_of_and_the_rest_counted(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    with watching(quiet=True) as watcher:
+        watcher.planned(12, 0, 12.0)
+        watcher.refused("x/a.glb", "in/x/a.glb: it is broken.")
+        for number in range(9):
+            watcher.started(task(number), 1.0)
+            watcher.ended(outcome(number, "failed"))
+        watcher.started(task(9), 1.0)
+        watcher.ended(replace(outcome(9, "failed"), reason="9.glb: it is another matter."))
+    assert capfd.readouterr().err.splitlines() == [
+        "aobake: error: in/x/a.glb: it is broken.",
+        "aobake: error: 0.glb: it is broken.",
+        "aobake: error: 1.glb: it is broken.",
+        "aobake: error: 9.glb: it is another matter.",
+        "aobake: error: and 7 more, which the report names: it is broken.",
+    ]
 
 
 def test_names_cannot_steer_the_terminal(capfd: pytest.CaptureFixture[str]) -> None:

@@ -16,6 +16,7 @@ from aobake.batch.parcels import delivered
 from aobake.batch.places import LocalFolder
 from aobake.batch.remote import RemoteFolder, place_of
 from aobake.batch.tasks import Outcome, Remote, Task
+from aobake.batch.tree import Tree
 from aobake.batch.worker import work
 from tests.batch.farm import far, floor_and_ball, task_of, tree
 
@@ -78,6 +79,18 @@ def test_a_stamp_tells_another_content_of_the_same_size(store: str) -> None:
     )
 
 
+def test_a_store_is_not_asked_for_what_its_listing_does_not_name(
+    store: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each question is a request: a batch may know of thousands of outputs that somebody has removed."""
+    folder = put(store, **{"a.glb": b"one"})
+    tree = Tree(folder)
+    monkeypatch.setattr(RemoteFolder, "stamp", None)
+    assert tree.stamp("a.glb") is not None
+    assert tree.stamp("missing.glb") is None
+    assert tree.gone("missing.glb")
+
+
 def test_files_are_copied_and_removed_and_a_second_removal_is_none(store: str) -> None:
     folder = put(store, **{"a.glb": b"one"})
     folder.copy("a.glb", "deep/down/b.glb")
@@ -88,7 +101,7 @@ def test_files_are_copied_and_removed_and_a_second_removal_is_none(store: str) -
 
 
 def test_what_a_killed_batch_left_is_removed_and_nothing_else(store: str) -> None:
-    left = ["a/.aobake-0a1b_-2.part", ".aobake-77ff77ff-tile0001.part"]
+    left = ["a/.aobake-0a1b2c3d-q_rstuvw.part", ".aobake-77ff77ff-tile0001.part"]
     kept = ["a/part", ".aobake/batch.json", "my.aobake-1.part.glb"]
     folder = put(store, **dict.fromkeys([*left, *kept], b"x"))
     assert sorted(folder.remove_leftovers()) == sorted(left)

@@ -12,15 +12,13 @@ from pathlib import Path
 import pytest
 
 from aobake.batch.places import local_folder
+from aobake.batch.progress import SILENT, Silent, Watcher
 from aobake.batch.run import Batch, Ended, Reports, run_batch
 from aobake.batch.settings import BatchSettings
 from aobake.batch.tasks import Capacity, Executor, Outcome, Status, Task
 from aobake.batch.worker import work
 from aobake.errors import OutputError
-
-CUBE = """v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
-f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 2 3 7 6\nf 1 5 8 4\n"""
-
+from tests.scenes import CUBE_OBJ
 
 TRIANGLE_PLY = """ply
 format ascii 1.0
@@ -88,7 +86,7 @@ def batch(tmp_path: Path) -> Batch:
     source = tmp_path / "in"
     (source / "props").mkdir(parents=True)
     for number, name in enumerate(("a.obj", "props/b.obj", "props/c.obj")):
-        (source / name).write_text(f"# {number}\n{CUBE}", encoding="ascii")
+        (source / name).write_text(f"# {number}\n{CUBE_OBJ}", encoding="ascii")
     (source / "broken.glb").write_bytes(b"glTF, not really")
     target = tmp_path / "out"
     return Batch(
@@ -103,12 +101,15 @@ def batch(tmp_path: Path) -> Batch:
     )
 
 
-def ran(batch: Batch, executor: InThisProcess | None = None, **how: object) -> Ended:
+def ran(
+    batch: Batch,
+    executor: InThisProcess | None = None,
+    *,
+    watcher: Watcher = SILENT,
+    stop: threading.Event | None = None,
+) -> Ended:
     executor = executor or InThisProcess()
-    stop = how.get("stop")
-    return run_batch(
-        batch, executor.opened, stop=stop if isinstance(stop, threading.Event) else None
-    )
+    return run_batch(batch, executor.opened, watcher=watcher, stop=stop)
 
 
 def states(batch: Batch) -> dict[str, str]:
@@ -144,7 +145,7 @@ def test_a_second_run_bakes_what_failed_alone(batch: Batch) -> None:
 def test_what_changed_is_baked_again_and_nothing_else(batch: Batch, tmp_path: Path) -> None:
     ran(batch)
     (tmp_path / "in" / "broken.glb").unlink()
-    (tmp_path / "in" / "a.obj").write_text(f"# other\n{CUBE}", encoding="ascii")
+    (tmp_path / "in" / "a.obj").write_text(f"# other\n{CUBE_OBJ}", encoding="ascii")
     (tmp_path / "out" / "props" / "b.obj").unlink()
     again = InThisProcess()
     ran(batch, again)
@@ -252,3 +253,20 @@ def test_a_second_batch_into_the_same_folder_is_refused(batch: Batch) -> None:
     ran(batch, InThisProcess(after=meanwhile))
     assert len(refusals) == 4
     assert all("another" in line and "\n" not in line for line in refusals)
+
+
+class Unlucky(Silent):
+    """Raises at the first task that ended, as a report does that cannot be written."""
+
+    def ended(self, outcome: Outcome, *, again: bool = False) -> None:  # noqa: ARG002 - whichever
+        raise OutputError("the disk is full.")
+
+
+def test_an_executor_serves_the_next_run_after_one_that_broke_off(batch: Batch) -> None:
+    executor = InThisProcess()
+    with pytest.raises(OutputError, match="the disk is full"):
+        ran(batch, executor, watcher=Unlucky())
+    assert executor.waiting == [], "what was under way is no business of the next run"
+    batch.source.path("props/c.obj").unlink()  # so that numbers stand for other tasks
+    ran(replace(batch, force=True), executor)
+    assert states(batch) == {"a.obj": "baked", "props/b.obj": "baked", "broken.glb": "failed"}

@@ -15,6 +15,7 @@ from aobake.batch.parts import first_part, join_bake, make_part
 from aobake.batch.tasks import Capacity, Outcome, Remote, Status, Task
 from aobake.batch.tiles import TiledExecutor
 from aobake.batch.worker import work
+from aobake.files import is_unfinished
 from aobake.jobs import run_job
 from aobake.settings import BakeSettings
 from tests.batch.farm import floor_and_ball, task_of, tree
@@ -241,4 +242,5 @@ def test_a_task_with_remote_folders_is_cut_as_well(tmp_path: Path) -> None:
     assert steps(inner) == ["layout"]
     part = inner.tasks[0].part
     assert part is not None
-    assert part.makes.startswith("sub/.aobake-")
+    assert part.makes.startswith("sub/")
+    assert all(is_unfinished(Path(name).name) for name in part.files), "swept up after a kill"

@@ -100,4 +100,5 @@ def test_a_folder_that_cannot_be_made_is_told(corner: Path, tmp_path: Path) -> N
     (tmp_path / "out").write_bytes(b"a file is in the way")
     outcome = work(task(corner, tmp_path / "out" / "deep" / "corner.glb"))
     assert outcome.status == "failed"
-    assert "its folder cannot be made" in outcome.reason
+    assert outcome.reason.startswith(f"{tmp_path}/out/deep/corner.glb: its folder ")
+    assert "cannot be made" in outcome.reason

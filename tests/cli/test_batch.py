@@ -15,8 +15,8 @@ import pytest
 
 from aobake.cli.batching import FolderOptions, batch_of
 from aobake.cli.watch import counts, written_by
-from tests.batch.test_run import CUBE
 from tests.conftest import Run
+from tests.scenes import CUBE_OBJ
 from tests.support import one_line
 
 LIMIT_S = 100.0  # for what takes a few seconds where nothing else runs
@@ -27,8 +27,8 @@ def folder(tmp_path: Path) -> Path:
     """Two assets, the one in a folder of its own with settings of its own."""
     source = tmp_path / "in"
     (source / "heroes").mkdir(parents=True)
-    (source / "crate.obj").write_text(CUBE, encoding="ascii")
-    (source / "heroes" / "it's <b>.obj").write_text(CUBE, encoding="ascii")
+    (source / "crate.obj").write_text(CUBE_OBJ, encoding="ascii")
+    (source / "heroes" / "it's <b>.obj").write_text(CUBE_OBJ, encoding="ascii")
     (source / "aobake.toml").write_text("rays = 4\n", encoding="ascii")
     (source / "heroes" / "aobake.toml").write_text("rays = 8\n", encoding="ascii")
     return source
@@ -95,7 +95,7 @@ def test_listed_commands_do_what_the_batch_does(run: Run, folder: Path, tmp_path
 def test_what_no_command_line_can_bake_is_said_and_the_others_are_listed(
     run: Run, folder: Path, tmp_path: Path
 ) -> None:
-    (folder / "two\nlines.obj").write_text(CUBE, encoding="ascii")
+    (folder / "two\nlines.obj").write_text(CUBE_OBJ, encoding="ascii")
     (folder / "crate.stl").write_text("solid\nendsolid\n", encoding="ascii")
     ran = run("batch", folder, "-o", tmp_path / "out", "--format", "glb", "--list-commands")
     assert ran.status == 1
@@ -164,7 +164,7 @@ def test_an_interrupted_batch_leaves_a_state_that_the_next_one_goes_on_from(
     run: Run, folder: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    (folder / "endless.obj").write_text(CUBE, encoding="ascii")
+    (folder / "endless.obj").write_text(CUBE_OBJ, encoding="ascii")
     (folder / "heroes" / "aobake.toml").write_text("rays = 8\n", encoding="ascii")
     slow = 'rays = 4\n[files."endless.obj"]\nrays = 65536\n'
     (folder / "aobake.toml").write_text(slow, encoding="ascii")
@@ -193,7 +193,7 @@ def test_a_watched_folder_is_baked_when_it_changes(folder: Path, tmp_path: Path)
     while "--preset is 'hero'" not in (line := process.stderr.readline()):  # and it goes on
         assert line, "it ended"
     settings.write_text("[preset.hero]\nrays = 4\n", encoding="ascii")
-    (folder / "late.obj").write_text(CUBE, encoding="ascii")
+    (folder / "late.obj").write_text(CUBE_OBJ, encoding="ascii")
     waiting_for(out / "late.obj", process)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=LIMIT_S)
@@ -208,7 +208,7 @@ def test_what_a_batch_writes_is_no_change_to_bake_for(tmp_path: Path) -> None:
     ours = written_by(batch_of(str(tmp_path), str(out), None, None, flags, command="watch"))
     own = (
         out / "a.glb", out / ".aobake" / "lock", junit, tmp_path / "r.json", tmp_path / "r.html",
-        tmp_path / "r_files" / "0.html", tmp_path / "state" / "batch.sqlite", tmp_path / ".aobake-0-1.part",
+        tmp_path / "r_files" / "0.html", tmp_path / "state" / "batch.sqlite", tmp_path / ".aobake-abc_1234.part",
     )  # fmt: skip
     assert [path.name for path in own if counts(str(path), ours)] == []
     assert counts(str(tmp_path / "outer.glb"), ours)

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from aobake.meshes.formats import READABLE
-from tests.batch.test_run import CUBE
 from tests.conftest import Run
+from tests.scenes import CUBE_OBJ
 from tests.support import ROOT
 
 HOOKS, ACTION = ROOT / ".pre-commit-hooks.yaml", ROOT / "action.yml"
@@ -75,7 +75,7 @@ def test_the_script_of_the_action_bakes_into_a_folder_that_is_not_there_yet(tmp_
     program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m aobake "$@"\n')
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
     (tmp_path / "my assets").mkdir()
-    (tmp_path / "my assets" / "crate.obj").write_text(CUBE, encoding="ascii")
+    (tmp_path / "my assets" / "crate.obj").write_text(CUBE_OBJ, encoding="ascii")
     environment = {
         **os.environ,
         "PATH": f"{program.parent}{os.pathsep}{os.environ['PATH']}",

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from aobake import Mesh
 from aobake.meshes.normals import unit_rows
 from aobake.meshes.surface import surface_of
 from tests.scenes import (
@@ -17,6 +16,7 @@ from tests.scenes import (
     box,
     icosphere,
     joined,
+    mesh_of,
     moved,
     patch,
     subdivided,
@@ -26,7 +26,7 @@ from tests.scenes import (
 
 
 def normals_of(mesh: Triangles, *, flat: bool = False) -> FloatArray:
-    return surface_of(Mesh(vertices=mesh.vertices, faces=mesh.faces, flat_shaded=flat)).normals
+    return surface_of(mesh_of(mesh, flat_shaded=flat)).normals
 
 
 def roof(degrees: float) -> Triangles:

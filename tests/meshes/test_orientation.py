@@ -8,13 +8,23 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from aobake import Mesh
 from aobake.meshes.surface import surface_of
-from tests.scenes import TURNED, Triangles, box, flipped, icosphere, joined, moved, patch, unwelded
+from tests.scenes import (
+    TURNED,
+    Triangles,
+    box,
+    flipped,
+    icosphere,
+    joined,
+    mesh_of,
+    moved,
+    patch,
+    unwelded,
+)
 
 
 def oriented(mesh: Triangles) -> NDArray[np.uint32]:
-    return surface_of(Mesh(vertices=mesh.vertices, faces=mesh.faces)).faces
+    return surface_of(mesh_of(mesh)).faces
 
 
 def volume(mesh: Triangles, faces: NDArray[np.uint32]) -> float:

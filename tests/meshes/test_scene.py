@@ -8,7 +8,7 @@ import trimesh
 
 from aobake import BakeSettings, InputError, Instance, Material, Mesh, Scene, bake_vertices
 from aobake.batch.pictures import thumbnails
-from tests.scenes import TURNED, box, icosphere
+from tests.scenes import TURNED, affine, box, icosphere
 
 VERTICES, FACES = box()
 
@@ -78,8 +78,7 @@ def test_arrays_at_an_odd_place_of_a_file_can_be_baked_and_seen() -> None:
     odd = np.frombuffer(data, np.int32, offset=2).reshape(-1, 3)
     assert not odd.flags.aligned
     mesh = Mesh(vertices=VERTICES, faces=odd)
-    apart = np.eye(4)
-    apart[0, 3] = 5.0
+    apart = affine(1.0, (5.0, 0.0, 0.0))
     scene = Scene(meshes=(mesh,), instances=(Instance(mesh=0), Instance(mesh=0, transform=apart)))
     assert scene.meshes[0].faces.flags.aligned
     assert set(thumbnails(bake_vertices(scene, BakeSettings(rays=16)))) == {"before", "after"}
@@ -129,8 +128,7 @@ def test_normals_that_a_trimesh_was_given_are_taken() -> None:
 def test_a_trimesh_scene_keeps_its_instances_and_passes_over_what_has_no_faces() -> None:
     body = trimesh.Trimesh(*icosphere(1), process=False)
     scene = trimesh.Scene()
-    turned = np.eye(4)
-    turned[:3, :3], turned[:3, 3] = TURNED, (5.0, 0.0, 0.0)
+    turned = affine(TURNED, (5.0, 0.0, 0.0))
     scene.add_geometry(body, node_name="one", geom_name="ball")
     scene.graph.update(frame_to="other", geometry="ball", matrix=turned)  # type: ignore[no-untyped-call]
     scene.add_geometry(trimesh.PointCloud(VERTICES), node_name="dust")  # type: ignore[no-untyped-call]

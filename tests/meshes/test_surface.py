@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aobake import Mesh
 from aobake.meshes.surface import Surface, surface_of
-from tests.scenes import FloatArray, Triangles, box, flipped, unwelded
+from tests.scenes import FloatArray, Triangles, box, flipped, mesh_of, unwelded
 
 BOX = box()
 
 
 def looked_at(mesh: Triangles, normals: FloatArray | None = None) -> Surface:
-    return surface_of(Mesh(vertices=mesh.vertices, faces=mesh.faces, normals=normals))
+    return surface_of(mesh_of(mesh, normals=normals))
 
 
 def said(surface: Surface) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""Pictures: what is lit, what is dark, what is seen through, and what is not simulated."""
+"""Pictures: what is lit, what is dark, and what is not simulated."""
 
 from __future__ import annotations
 
@@ -9,44 +9,30 @@ import numpy as np
 import pytest
 
 from aobake.errors import InputError, SettingsError
-from aobake.meshes.scene import Instance, Light, Material, Scene, Texture
+from aobake.meshes.scene import Instance, Light, Scene
 from aobake.render_settings import RenderSettings
 from aobake.settings import TraceSettings
 from aobake.shading.camera import sample_places
 from aobake.shading.materials import Baked
-from aobake.shading.preview import Preview, render
+from aobake.shading.preview import render
 from tests.pictures import (
-    CARD_UV,
+    BEAUTY,
     DIM,
     Float32Array,
-    attribute,
     card,
-    image,
     looking_down_z,
-    mesh,
+    middle,
+    one_sun,
     scene_of,
-    sunlight,
 )
-from tests.scenes import box, floor, icosphere, joined, moved, rotation, unwelded
-
-BEAUTY = dataclasses.replace(DIM, lights="auto", ambient=0.25)
-
-
-def middle(preview: Preview) -> Float32Array:
-    """(4,) the pixel in the middle."""
-    height, width = preview.pixels.shape[:2]
-    return np.asarray(preview.pixels[height // 2, width // 2])
-
-
-def one_sun(towards: tuple[float, float, float]) -> tuple[Light, ...]:
-    return (sunlight(towards),)
+from tests.scenes import affine, box, floor, icosphere, joined, mesh_of, moved, rotation, unwelded
 
 
 def test_a_white_sphere_under_constant_ambient_light_equals_its_occlusion() -> None:
     """Occlusion that is linear in y is known at each pixel of an orthographic picture."""
     ball = icosphere(4, 0.9)
     baked = Baked(ao=[(0.5 + 0.4 * ball.vertices[:, 1]).astype(np.float32)])
-    shown = render(scene_of(mesh(ball)), DIM, baked).pixels
+    shown = render(scene_of(mesh_of(ball)), DIM, baked).pixels
     rows = 1.0 - (np.arange(32) + sample_places(4)[:, 1].mean()) / 16
     inside = (shown[..., 3] == 1.0).sum()
     assert inside > 500
@@ -57,7 +43,7 @@ def test_a_white_sphere_under_constant_ambient_light_equals_its_occlusion() -> N
 @pytest.mark.parametrize("model", ["lambert", "oren-nayar", "phong", "blinn-phong"])
 def test_a_white_open_sphere_in_a_furnace_is_white(model: str) -> None:
     settings = dataclasses.replace(DIM, model=model)
-    shown = render(scene_of(mesh(icosphere(3))), settings).pixels
+    shown = render(scene_of(mesh_of(icosphere(3))), settings).pixels
     assert np.abs(shown[..., :3] - shown[..., 3:]).max() < 1e-6
     assert shown[16, 16, 3] == 1.0
 
@@ -65,7 +51,7 @@ def test_a_white_open_sphere_in_a_furnace_is_white(model: str) -> None:
 def test_a_mirror_symmetric_scene_gives_a_mirror_symmetric_picture() -> None:
     things = joined(moved(box(), 0.5, (0, -0.5, 0.3)), icosphere(3, 0.6), floor(1.0, -1.0))
     scene = dataclasses.replace(
-        scene_of(mesh(things), cameras=()), lights=one_sun((0.0, -1.0, -1.0))
+        scene_of(mesh_of(things), cameras=()), lights=one_sun((0.0, -1.0, -1.0))
     )
     for size in ("48x32", "33x32"):
         shown = render(scene, dataclasses.replace(BEAUTY, size=size, view="0,15", samples=5)).pixels
@@ -74,7 +60,7 @@ def test_a_mirror_symmetric_scene_gives_a_mirror_symmetric_picture() -> None:
 
 
 def test_a_picture_is_the_same_for_any_number_of_threads() -> None:
-    scene = scene_of(mesh(joined(icosphere(3, 0.5), moved(box(), 0.3, (0.5, 0.5, 0.5)))))
+    scene = scene_of(mesh_of(joined(icosphere(3, 0.5), moved(box(), 0.3, (0.5, 0.5, 0.5)))))
     settings = dataclasses.replace(BEAUTY, size="200x150", samples=16)
     one, four = (
         render(scene, settings, trace=TraceSettings(threads=n, ground="+y")).pixels.tobytes()
@@ -87,13 +73,13 @@ def test_a_picture_is_the_same_for_any_number_of_threads() -> None:
 def test_a_lit_card_is_ambient_light_and_lamberts_cosine(tilt: float) -> None:
     sun = one_sun((math.sin(tilt), 0.0, -math.cos(tilt)))
     settings = dataclasses.replace(BEAUTY, key=2.0)
-    shown = middle(render(scene_of(mesh(card()), lights=sun), settings))
+    shown = middle(render(scene_of(mesh_of(card()), lights=sun), settings))
     # Lights of a file are brought to the key's irradiance on what is lit by them.
     assert shown[0] == pytest.approx(0.25 + 2.0 / math.pi, abs=1e-5)
 
 
 def test_occlusion_darkens_the_ambient_term_and_nothing_else() -> None:
-    lit = scene_of(mesh(card()), lights=one_sun((0, 0, -1)))
+    lit = scene_of(mesh_of(card()), lights=one_sun((0, 0, -1)))
     settings = dataclasses.replace(BEAUTY, ambient=0.3)
     opened, closed = (
         middle(render(lit, settings, Baked(ao=[np.full(4, ao, np.float32)])))[0] for ao in (1, 0)
@@ -108,7 +94,7 @@ def test_occlusion_darkens_the_ambient_term_and_nothing_else() -> None:
 
 def test_what_stands_before_the_light_casts_a_shadow() -> None:
     lid = moved(card(3.0, 0.5), 1.0, (3.0, 0.0, 0.0))
-    scene = scene_of(mesh(joined(card(), lid)), lights=one_sun((-1.0, 0.0, -1.0)))
+    scene = scene_of(mesh_of(joined(card(), lid)), lights=one_sun((-1.0, 0.0, -1.0)))
     shadow = middle(render(scene, BEAUTY))
     assert shadow[0] == pytest.approx(0.25, abs=1e-6)
     assert middle(render(scene, dataclasses.replace(BEAUTY, no_shadows=True)))[0] > 0.5
@@ -118,7 +104,7 @@ def test_what_stands_before_the_light_casts_a_shadow() -> None:
 def test_a_smooth_coarse_ball_has_no_shadow_of_its_own_facets() -> None:
     """Where the smooth surface is lit well, no facet before it may take the light away."""
     ball = icosphere(1)
-    lit = mesh(ball, normals=ball.vertices)
+    lit = mesh_of(ball, normals=ball.vertices)
     settings = dataclasses.replace(BEAUTY, size="64x64")
     shown, free = (
         render(
@@ -133,7 +119,7 @@ def test_a_smooth_coarse_ball_has_no_shadow_of_its_own_facets() -> None:
 def test_a_shading_normal_is_that_of_the_sphere() -> None:
     ball = icosphere(3, 0.9)
     settings = dataclasses.replace(DIM, channel="normal", samples=1)
-    shown = render(scene_of(mesh(ball, normals=ball.vertices)), settings).pixels
+    shown = render(scene_of(mesh_of(ball, normals=ball.vertices)), settings).pixels
     x = (np.arange(32) + 0.5) / 16 - 1.0
     y = 1.0 - (np.arange(32) + sample_places(1)[0, 1]) / 16
     rows, columns = np.nonzero(shown[..., 3])
@@ -147,108 +133,25 @@ def test_a_shading_normal_is_that_of_the_sphere() -> None:
 
 def test_a_box_without_normals_has_flat_sides() -> None:
     shown = render(
-        scene_of(mesh(moved(box(), rotation((1, 1, 0), 0.6)))),
+        scene_of(mesh_of(moved(box(), rotation((1, 1, 0), 0.6)))),
         dataclasses.replace(DIM, channel="normal", samples=1),
     ).pixels
     colors = np.unique(np.round(shown[shown[..., 3] > 0][:, :3], 3), axis=0)
     assert len(colors) == 3
 
 
-def test_base_colour_is_texture_times_factor_times_vertex_colour() -> None:
-    pixels = np.zeros((2, 2, 3), np.float32)
-    pixels[:, 0], pixels[:, 1] = (128 / 255, 0, 0), (0, 0, 1)
-    paint = Material(
-        base_color=(0.5, 1.0, 0.5, 1.0), base_color_texture=Texture(image=0, nearest=True)
-    )
-    quad = mesh(
-        card(),
-        material=0,
-        attributes={"TEXCOORD_0": attribute(CARD_UV), "COLOR_0": attribute(np.full((4, 3), 0.5))},
-    )
-    shown = render(scene_of(quad, materials=(paint,), images=(image(pixels),)), DIM).pixels
-    half_grey = ((128 / 255 + 0.055) / 1.055) ** 2.4  # sRGB
-    assert shown[16, 4, :3] == pytest.approx((0.25 * half_grey, 0, 0), abs=1e-5)
-    assert shown[16, 28, :3] == pytest.approx((0, 0, 0.25), abs=1e-5)
-
-
-def test_an_occlusion_texture_is_linear_and_obeys_its_strength() -> None:
-    paint = Material(occlusion_texture=Texture(image=0), occlusion_strength=0.5)
-    quad = mesh(card(), material=0, attributes={"TEXCOORD_0": attribute(CARD_UV)})
-    dark = image(np.full((2, 2, 3), 51 / 255))
-    shown = render(scene_of(quad, materials=(paint,), images=(dark,)), DIM)
-    assert middle(shown)[0] == pytest.approx(1.0 + 0.5 * (0.2 - 1.0), abs=1e-5)
-    assert shown.effects["ambient_occlusion"].on
-
-
-def test_the_attribute_ao_goes_before_a_texture() -> None:
-    paint = Material(occlusion_texture=Texture(image=0))
-    values = {"TEXCOORD_0": attribute(CARD_UV), "_AO": attribute(np.full(4, 0.7))}
-    quad = mesh(card(), material=0, attributes=values)
-    shown = render(scene_of(quad, materials=(paint,), images=(image(np.zeros((2, 2, 3))),)), DIM)
-    assert middle(shown)[0] == pytest.approx(0.7, abs=1e-6)
-
-
-def test_bent_normals_are_shown_where_a_mesh_has_them() -> None:
-    quad = mesh(card(), attributes={"_BENT_NORMAL": attribute(np.tile((0.6, 0.0, 0.8), (4, 1)))})
-    shown = render(scene_of(quad), dataclasses.replace(DIM, channel="bent-normal"))
-    assert middle(shown)[:3] == pytest.approx((0.8, 0.5, 0.9), abs=1e-6)
-    assert shown.effects["bent_normals"].on
-
-
-def test_an_image_that_cannot_be_read_is_left_out_with_a_warning() -> None:
-    def broken() -> bytes:
-        raise InputError("bark.png: there is no such file.")
-
-    paint = Material(base_color=(0.5, 0.5, 0.5, 1.0), base_color_texture=Texture(image=0))
-    quad = mesh(card(), material=0, attributes={"TEXCOORD_0": attribute(CARD_UV)})
-    picture = dataclasses.replace(image(np.zeros((1, 1, 3)), "bark"), data=broken)
-    shown = render(scene_of(quad, materials=(paint,), images=(picture,)), DIM)
-    assert middle(shown)[0] == pytest.approx(0.5, abs=1e-6)
-    assert [line for line in shown.warnings if "bark.png" in line]
-
-
-def _behind(alpha: float, mode: str) -> Preview:
-    """A black card with this alpha before a white one."""
-    glass = Material(base_color=(0.0, 0.0, 0.0, alpha), alpha_mode=mode)  # type: ignore[arg-type]
-    return render(
-        scene_of(mesh(card(0.5), material=0), mesh(card(0.0, 2.0)), materials=(glass,)), DIM
-    )
-
-
-@pytest.mark.parametrize(
-    ("alpha", "mode", "wanted"),
-    [(0.25, "OPAQUE", 0.0), (0.25, "MASK", 1.0), (0.75, "MASK", 0.0), (0.25, "BLEND", 0.75)],
-)
-def test_what_is_cut_out_or_blended_shows_what_is_behind(
-    alpha: float, mode: str, wanted: float
-) -> None:
-    shown = middle(_behind(alpha, mode))
-    assert shown[0] == pytest.approx(wanted, abs=1e-6)
-    assert shown[3] == 1.0
-
-
-def test_light_falls_through_what_is_cut_out() -> None:
-    hole = Material(base_color=(1.0, 1.0, 1.0, 0.0), alpha_mode="MASK")
-    lid = mesh(moved(card(3.0, 0.5), 1.0, (3.0, 0.0, 0.0)), material=0)
-    sun = one_sun((-1.0, 0.0, -1.0))
-    scene = scene_of(mesh(card()), lid, materials=(hole,), lights=sun)
-    assert middle(render(scene, BEAUTY))[0] > 0.5
-
-
 def test_instances_look_like_the_copies_that_they_are() -> None:
     ball = icosphere(2, 0.3)
     places = []
     for x, y, linear in ((-0.5, 0.2, np.eye(3)), (0.5, -0.2, np.diag([-1.0, 0.5, 1.0]))):
-        place = np.eye(4)
-        place[:3, :3], place[:3, 3] = linear, (x, y, 0.0)
-        places.append(place)
-    one = mesh(ball, normals=ball.vertices)
+        places.append(affine(linear, (x, y, 0.0)))
+    one = mesh_of(ball, normals=ball.vertices)
     placed = dataclasses.replace(
         scene_of(one), instances=tuple(Instance(mesh=0, transform=place) for place in places)
     )
     copies = scene_of(
         *(
-            mesh(
+            mesh_of(
                 moved(ball, place[:3, :3], place[:3, 3]),
                 normals=ball.vertices @ np.linalg.inv(place[:3, :3]),
             )
@@ -265,14 +168,14 @@ def test_size_and_place_of_a_scene_do_not_show(scale: float, shift: float) -> No
     things = joined(icosphere(3, 0.5), floor(1.0, -0.5))
     settings = dataclasses.replace(BEAUTY, view="20,30", size="48x32")
     a, b = (
-        render(scene_of(mesh(each), cameras=()), settings).pixels
+        render(scene_of(mesh_of(each), cameras=()), settings).pixels
         for each in (things, moved(things, scale, (shift, -shift, shift)))
     )
     assert np.abs(a - b).mean() < 2e-3
 
 
 def test_the_ground_takes_light_away_where_things_stand_on_it() -> None:
-    scene = scene_of(mesh(moved(box(), 1.0, (0.0, 0.5, 0.0))), cameras=())
+    scene = scene_of(mesh_of(moved(box(), 1.0, (0.0, 0.5, 0.0))), cameras=())
     settings = dataclasses.replace(DIM, view="0,20", size="64x48")
     ground = TraceSettings(ground="+y")
     alpha = render(scene, settings, trace=ground).pixels[..., 3]
@@ -288,19 +191,18 @@ def test_the_ground_takes_light_away_where_things_stand_on_it() -> None:
 
 
 def test_an_open_ground_shows_nothing_far_from_what_stands_on_it() -> None:
-    scene = scene_of(mesh(moved(card(), rotation((1, 0, 0), -math.pi / 2))), cameras=())
+    scene = scene_of(mesh_of(moved(card(), rotation((1, 0, 0), -math.pi / 2))), cameras=())
     settings = dataclasses.replace(DIM, view="0,60", size="64x48")
     shown = render(scene, settings, trace=TraceSettings(ground="+y")).pixels
     assert shown[0, 0, 3] < 0.02
 
 
 def test_a_point_light_falls_off_with_the_square_of_its_distance() -> None:
-    place = np.eye(4)
-    place[2, 3] = 2.0
+    place = affine(1.0, (0.0, 0.0, 2.0))
     lamp = Light(kind="point", transform=place)
     settings = dataclasses.replace(BEAUTY, ambient=0.0, size="33x33", samples=1)
     shown = render(
-        scene_of(mesh(card(half=4.0)), lights=(lamp,), cameras=(looking_down_z(8.0),)), settings
+        scene_of(mesh_of(card(half=4.0)), lights=(lamp,), cameras=(looking_down_z(8.0),)), settings
     )
     center, side = shown.pixels[16, 16, 0], shown.pixels[16, 24, 0]
     x, y = 8 / 33 * 8.0, (0.5 - sample_places(1)[0, 1]) * 8.0 / 33
@@ -310,11 +212,10 @@ def test_a_point_light_falls_off_with_the_square_of_its_distance() -> None:
 
 
 def test_a_spot_is_dark_outside_of_its_cone() -> None:
-    place = np.eye(4)
-    place[2, 3] = 2.0
+    place = affine(1.0, (0.0, 0.0, 2.0))
     lamp = Light(kind="spot", transform=place, cone_rad=(0.1, math.atan(0.5)))
     settings = dataclasses.replace(BEAUTY, ambient=0.0, size="33x33")
-    scene = scene_of(mesh(card(half=4.0)), lights=(lamp,), cameras=(looking_down_z(8.0),))
+    scene = scene_of(mesh_of(card(half=4.0)), lights=(lamp,), cameras=(looking_down_z(8.0),))
     shown = render(scene, settings).pixels
     assert shown[16, 16, 0] > 0.1
     assert shown[16, 24, 0] == 0.0
@@ -324,7 +225,7 @@ def test_only_what_the_scene_calls_for_is_computed(monkeypatch: pytest.MonkeyPat
     def never(*_: object, **__: object) -> None:
         raise AssertionError("this was not called for")
 
-    scene = scene_of(mesh(icosphere(2)), lights=one_sun((0, 0, -1)))
+    scene = scene_of(mesh_of(icosphere(2)), lights=one_sun((0, 0, -1)))
     monkeypatch.setattr("aobake.shading.shot.reach", never)
     dim = render(scene, DIM)
     assert not dim.effects["shadows"].on
@@ -354,7 +255,7 @@ def _only_checking() -> object:
 
 
 def test_a_camera_inside_of_something_is_rendered_with_a_warning() -> None:
-    shell = scene_of(mesh(unwelded(moved(box(), 30.0))))
+    shell = scene_of(mesh_of(unwelded(moved(box(), 30.0))))
     shell = dataclasses.replace(
         shell, cameras=(dataclasses.replace(looking_down_z(), yfov_rad=1.0, height=None),)
     )
@@ -385,7 +286,7 @@ def test_what_cannot_be_shown_is_refused(
 ) -> None:
     chosen = dataclasses.replace(DIM, **settings)  # type: ignore[arg-type]
     with pytest.raises(error) as caught:
-        render(scene_of(mesh(card())), chosen)
+        render(scene_of(mesh_of(card())), chosen)
     assert all(word in str(caught.value) for word in words)
     assert "\n" not in str(caught.value)
 
@@ -394,7 +295,7 @@ def test_what_cannot_be_shown_is_refused(
 def test_occlusion_of_another_scene_is_refused(shapes: list[int]) -> None:
     baked = Baked(ao=[np.ones(count, np.float32) for count in shapes])
     with pytest.raises(InputError, match="does not fit the scene"):
-        render(scene_of(mesh(card())), DIM, baked)
+        render(scene_of(mesh_of(card())), DIM, baked)
 
 
 def test_a_scene_without_faces_is_refused() -> None:

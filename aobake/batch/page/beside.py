@@ -11,8 +11,7 @@ import re
 from pathlib import Path
 from urllib.parse import quote
 
-from aobake.errors import OutputError
-from aobake.files import write_files
+from aobake.files import make_folder, write_files
 
 __all__ = ["Beside", "files_beside", "keep_viewer"]
 
@@ -32,7 +31,7 @@ def keep_viewer(page: Path, target: str, viewer: bytes) -> None:
     Raises OutputError.
     """
     beside = Beside(page)
-    beside.make()
+    make_folder(beside.folder)
     for name, content in _scripts().items():
         if not _holds(beside.folder / name, len(content)):
             write_files({beside.folder / name: content})
@@ -47,15 +46,6 @@ class Beside:
         self.folder = files_beside(page)
         self._used: set[str] = set()
 
-    def make(self) -> None:
-        """Make the folder. Raises OutputError."""
-        try:
-            self.folder.mkdir(exist_ok=True)
-        except OSError as error:
-            raise OutputError(
-                f"{self.folder}: it cannot be made ({error.strerror or error})."
-            ) from error
-
     def viewer(self, target: str) -> str | None:
         """The address of the viewer of an asset, relative to the page; None where none was kept."""
         name = _viewer_name(target)
@@ -65,7 +55,7 @@ class Beside:
         """The address of a picture that is kept here from now on. Raises OutputError."""
         name = f"{hashlib.sha256(png).hexdigest()[:32]}.png"
         if not _holds(self.folder / name, len(png)):
-            self.make()
+            make_folder(self.folder)
             write_files({self.folder / name: png}, sync=False)
         return self._address(name)
 
@@ -82,9 +72,8 @@ class Beside:
 
 @functools.cache
 def _scripts() -> dict[str, bytes]:
-    from aobake.viewer.page import (
-        shared_scripts,
-    )  # which takes longer than a batch with nothing to do
+    # Heavy: to import it takes longer than a batch with nothing to do.
+    from aobake.viewer.page import shared_scripts
 
     return shared_scripts()
 

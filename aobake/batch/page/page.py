@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import html
 import string
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -16,6 +15,7 @@ from aobake.batch.page.rows import as_json, row_of
 from aobake.batch.summary import RunFacts
 from aobake.batch.tasks import Entry
 from aobake.files import write_files
+from aobake.standalone import hash_source, policy
 
 __all__ = ["MOST_EMBEDDED", "write_page"]
 
@@ -66,8 +66,13 @@ def _pieces(
     run: RunFacts, entries: Iterable[Entry], pictures: _Pictures, beside: Beside
 ) -> Iterator[bytes]:
     style, script = _text("page.css"), _text("page.js")
+    rules = policy(
+        scripts=[hash_source(script)],
+        styles=[hash_source(style)],
+        images=["data:", "'self'"],  # pictures within it and beside it
+    )
     page = string.Template(_text("page.html")).substitute(
-        policy=html.escape(_policy(style, script)),
+        policy=html.escape(rules),
         version=html.escape(run.version),
         source=_shown(run.source),
         target=_shown(run.target),
@@ -114,19 +119,6 @@ def _duration(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
     return f"{whole // 3600} h {whole % 3600 // 60} min"
-
-
-def _policy(style: str, script: str) -> str:
-    """What the page may do: run its own script, and show pictures of its own and beside it."""
-    return (
-        f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; "
-        "img-src data: 'self'; base-uri 'none'; form-action 'none'"
-    )
-
-
-def _hash(text: str) -> str:
-    digest = hashlib.sha256(text.encode("utf-8")).digest()
-    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
 
 
 def _text(name: str) -> str:

@@ -9,7 +9,7 @@ from aobake.errors import InputError, OutputError
 from aobake.files import read_bytes, same_file
 from aobake.meshes.formats.references import references
 
-__all__ = ["copies_beside", "make_folders"]
+__all__ = ["copies_beside"]
 
 
 def copies_beside(asset: Path, files: Iterable[Path], target: Path) -> dict[Path, bytes]:
@@ -58,14 +58,3 @@ def _content(file: Path, asset: Path) -> bytes:
         return read_bytes(file, asset.name)
     except InputError as error:
         raise OutputError(str(error)) from error
-
-
-def make_folders(copies: Iterable[Path], target: Path) -> None:
-    """Make the folders that the copies go into. Raises OutputError."""
-    for copy in copies:
-        try:
-            copy.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(
-                f"{copy.parent}: this folder, which {target.name} needs, cannot be made ({error.strerror})."
-            ) from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import posixpath
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -58,7 +57,9 @@ def _obj(path: Path) -> Iterator[str]:
 
 
 def _usd(path: Path) -> Iterator[str]:
-    if importlib.util.find_spec("pxr") is None:
+    from aobake.meshes.formats.usd import available
+
+    if not available():
         return
     from aobake.meshes.formats.usd.stage import layer_names
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from aobake.errors import OutputError
-from aobake.files import Content, check_writable, write_files
-from aobake.meshes.formats.beside import copies_beside, make_folders
+from aobake.files import Content, check_writable, make_folder, write_files
+from aobake.meshes.formats.beside import copies_beside
 from aobake.meshes.formats.obj.coordinates import Change, new_coordinates
 from aobake.meshes.formats.obj.fresh_lightmap import fresh_lightmap
 from aobake.meshes.formats.obj.geometry import Geometry, parse
@@ -104,7 +104,8 @@ def write_texture(
     )
     asset = texts.pop(target)
     beside: dict[Path, Content] = {**texts, **_images(lightmap, image, names), **copies}
-    make_folders(beside, target)
+    for path in beside:
+        make_folder(path.parent, needed_by=target.name)
     write_files({**beside, target: asset})
     return (target, *beside)
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.errors import OutputError
-from aobake.files import write_files
-from aobake.meshes.formats.beside import copies_beside, make_folders
+from aobake.files import make_folder, write_files
+from aobake.meshes.formats.beside import copies_beside
 from aobake.meshes.formats.merged import merged
 from aobake.meshes.formats.obj.fresh import document
 from aobake.meshes.formats.obj.geometry import vertex_values
@@ -75,7 +75,8 @@ def write(
         )
     text = patched(scene.source.text, ao[0], str(target))
     copies = copies_beside(scene.source.path, scene.source.files[1:], target)
-    make_folders(copies, target)
+    for copy in copies:
+        make_folder(copy.parent, needed_by=target.name)
     write_files({**copies, target: text})
     return (target, *copies)
 

@@ -3,7 +3,7 @@
 Needs the package usd-core (the extra `usd`), whose one import site is stage.py.
 """
 
-from aobake.meshes.formats.usd.reading import read
+from aobake.meshes.formats.usd.reading import available, read
 from aobake.meshes.formats.usd.writing import check, write
 
-__all__ = ["check", "read", "write"]
+__all__ = ["available", "check", "read", "write"]

@@ -31,7 +31,12 @@ from aobake.meshes.scene import (
 if TYPE_CHECKING:
     from aobake.meshes.formats.usd.prims import MeshPrim, Opened
 
-__all__ = ["read"]
+__all__ = ["available", "read"]
+
+
+def available() -> bool:
+    """Whether Pixar's library (usd-core) is installed."""
+    return importlib.util.find_spec("pxr") is not None
 
 
 def read(path: Path, *, root: Path | None, scene: str | None) -> Scene:
@@ -45,7 +50,7 @@ def read(path: Path, *, root: Path | None, scene: str | None) -> Scene:
         raise InputError(
             f"{path}: a USD file holds one scene, and scene {scene!r} was asked for. Leave it out."
         )
-    if importlib.util.find_spec("pxr") is None:
+    if not available():
         raise InputError(
             f"{path}: reading USD needs the package usd-core, not installed here. "
             'Install the extra: pip install "aobake[usd]".'

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from aobake.images import decode
 from aobake.meshes.formats import gltf
 from aobake.meshes.formats.gltf.accessors import AccessorReader
 from aobake.meshes.formats.gltf.document import open_document
@@ -21,6 +22,7 @@ Json = dict[str, Any]
 KINDS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 SQUARE = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
+UV = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]  # of its corners
 TWO_TRIANGLES = [0, 1, 2, 0, 2, 3]
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 
@@ -106,7 +108,18 @@ def square_builder(**node: Any) -> Builder:
     return builder.show(builder.node(mesh=builder.mesh(name="square"), **node))
 
 
-def pack_glb(document: Json, data: bytes | None, *more: tuple[int, bytes]) -> bytes:
+def mapped(material: Json | None = None, **more: Any) -> Builder:
+    """A square with TEXCOORD_0, of one material."""
+    builder = Builder()
+    uv = builder.accessor(UV)
+    if material is not None:
+        builder.put("materials", material)
+        more["material"] = 0
+    part = builder.primitive(attributes={"TEXCOORD_0": uv}, **more)
+    return builder.show(builder.node(mesh=builder.mesh(part, name="square")))
+
+
+def pack_glb(document: Json, data: bytes | None = None, *more: tuple[int, bytes]) -> bytes:
     """A GLB of this JSON, this BIN chunk and further chunks."""
     text = json.dumps(document).encode()
     chunks = [(JSON_CHUNK, text + b" " * (-len(text) % 4))]
@@ -116,9 +129,9 @@ def pack_glb(document: Json, data: bytes | None, *more: tuple[int, bytes]) -> by
     return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
-def unpack_glb(path: Path) -> tuple[Json, bytes, list[tuple[int, bytes]]]:
+def unpack_glb(file: Path | bytes) -> tuple[Json, bytes, list[tuple[int, bytes]]]:
     """JSON, BIN and the other chunks of a GLB; checks the lengths and the alignment of what it must align."""
-    data = path.read_bytes()
+    data = file if isinstance(file, bytes) else file.read_bytes()
     magic, version, length = struct.unpack_from("<4sII", data)
     assert (magic, version) == (b"glTF", 2)
     chunks, at = [], 12
@@ -145,6 +158,11 @@ def ramp(scene: Scene) -> list[NDArray[np.float32]]:
     return [rng.random(len(mesh.vertices), np.float32) for _, mesh in scene.placed()]
 
 
+def constant(*values: float) -> list[NDArray[np.float32]]:
+    """One value for all vertices of each instance, which is a square."""
+    return [np.full(4, value, np.float32) for value in values]
+
+
 def bake(
     source: Path,
     target: Path,
@@ -164,3 +182,19 @@ def attribute(path: Path, name: str, mesh: int = 0, primitive: int = 0) -> NDArr
     part = document.entry("meshes", mesh).children("primitives", "primitive")[primitive]
     number = part.needed("attributes").integer(name)
     return AccessorReader(document).values(number, ("SCALAR", "VEC2", "VEC3", "VEC4"))
+
+
+def textures_of(path: Path) -> dict[str, np.ndarray]:
+    """Decoded image of every texture that a material of a GLB names, by 'number key'."""
+    document, binary, _ = unpack_glb(path)
+    found = {}
+    for number, material in enumerate(document.get("materials", [])):
+        named = {**material, **material.get("pbrMetallicRoughness", {})}
+        for key in ("occlusionTexture", "metallicRoughnessTexture"):
+            if key in named:
+                image = document["images"][document["textures"][named[key]["index"]]["source"]]
+                view = document["bufferViews"][image["bufferView"]]
+                start = view.get("byteOffset", 0)
+                data = binary[start : start + view["byteLength"]]
+                found[f"{number} {key}"] = decode(data, key)
+    return found

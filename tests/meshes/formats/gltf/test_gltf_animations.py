@@ -1,78 +1,39 @@
-"""Assets at a moment of their animations: where things stand, what is baked, what is refused."""
+"""Assets at a moment of their animations: where things stand, and what is baked."""
 
 from __future__ import annotations
 
-import random
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 
 import aobake
-from aobake.errors import InputError, SettingsError
+from aobake.errors import InputError
 from aobake.meshes.motion import Motion
-from aobake.meshes.scene import Scene
 from tests.conftest import Run
 from tests.known import wall_factor
 from tests.meshes.formats.gltf.build import (
     SQUARE,
     Builder,
     attribute,
-    pack_glb,
     square_builder,
     unpack_glb,
 )
-from tests.meshes.formats.gltf.test_gltf_fuzz import damaged_json, refused
-from tests.scenes import moved, patch
+from tests.meshes.formats.gltf.clips import (
+    CENTRE,
+    FLAP,
+    FLOOR,
+    UPRIGHT,
+    animate,
+    at,
+    hinge,
+    lifted,
+    moving,
+    places,
+    sliding_square,
+)
+from tests.scenes import moved
 from tests.support import one_line
-
-HALF = np.sqrt(0.5)
-
-
-def animate(builder: Builder, name: str | None, *channels: dict[str, Any]) -> None:
-    """A clip of these channels: node, path, times, values, how, dtype, more for the accessor of values."""
-    samplers, targets = [], []
-    for channel in channels:
-        values = builder.accessor(
-            channel["values"], channel.get("dtype", "f4"), **channel.get("more", {})
-        )
-        samplers.append(
-            {
-                "input": builder.accessor(channel["times"]),
-                "output": values,
-                "interpolation": channel.get("how", "LINEAR"),
-            }
-        )
-        target = {"node": channel["node"], "path": channel["path"]}
-        targets.append({"sampler": len(samplers) - 1, "target": target})
-    clip = {"samplers": samplers, "channels": targets}
-    builder.put("animations", clip if name is None else {"name": name, **clip})
-
-
-def moving(path: str, times: ArrayLike, values: ArrayLike, **more: Any) -> dict[str, Any]:
-    """A channel of node 0."""
-    return {"node": 0, "path": path, "times": times, "values": values, **more}
-
-
-def sliding_square() -> Builder:
-    """From x = 0 to 4 in two seconds; the file has it at x = 100."""
-    builder = square_builder(translation=[100, 0, 0])
-    animate(builder, "slide", moving("translation", [0, 2], [[0, 0, 0], [4, 0, 0]]))
-    return builder
-
-
-def at(builder: Builder, folder: Path, pose: str | None) -> Scene:
-    return aobake.load(builder.glb(folder / "a.glb"), pose=pose)
-
-
-def places(scene: Scene) -> list[list[float]]:
-    """(V, 3) corners of the first instance where they stand."""
-    instance, mesh = next(scene.placed())
-    placed = mesh.vertices @ instance.transform[:3, :3].T + instance.transform[:3, 3]
-    return [list(row) for row in placed]
 
 
 @pytest.mark.parametrize("clip", ["slide", "0"])
@@ -132,17 +93,6 @@ def test_rotations_may_be_normalised_whole_numbers(tmp_path: Path, dtype: str) -
         moving("rotation", [0, 1], keys, dtype=dtype, more={"normalized": True}),
     )
     np.testing.assert_allclose(places(at(builder, tmp_path, "a@0.5"))[1], [0, 1, 0], atol=1e-12)
-
-
-def lifted(weights: list[float]) -> Builder:
-    """A square with a target that lifts it by 1 and one that moves it by 10 along x."""
-    builder = Builder()
-    targets = [
-        {"POSITION": builder.accessor([[0, 0, 1]] * 4)},
-        {"POSITION": builder.accessor([[10, 0, 0]] * 4)},
-    ]
-    mesh = builder.mesh(builder.primitive(targets=targets), name="face", weights=weights)
-    return builder.show(builder.node(mesh=mesh))
 
 
 @pytest.mark.parametrize("how", ["LINEAR", "CUBICSPLINE"])
@@ -221,120 +171,6 @@ def test_what_moves_no_node_is_passed_over_with_a_warning(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    "pose", ["slide", "slide@", "@1", "slide@now", "slide@nan", "slide@inf", ""]
-)
-def test_what_is_no_pose_is_a_wrong_setting(tmp_path: Path, pose: str) -> None:
-    with pytest.raises(SettingsError, match="CLIP@SECONDS"):
-        at(sliding_square(), tmp_path, pose)
-
-
-@pytest.mark.parametrize(
-    ("pose", "words"),
-    [
-        ("slyde@1", "no animation 'slyde'. Did you mean \"slide\""),
-        ("7@1", "no animation '7'"),
-        ("slide@2.001", 'animation 0 "slide" lasts from 0.0 to 2.0 s, and 2.001 s'),
-        ("slide@-0.1", "lasts from 0.0 to 2.0 s"),
-        ("slide@1e300", "1e+300 s was asked for"),
-    ],
-)
-def test_clips_and_moments_that_are_not_there_are_refused(
-    tmp_path: Path, pose: str, words: str
-) -> None:
-    with pytest.raises(InputError) as refused:
-        at(sliding_square(), tmp_path, pose)
-    assert words in str(refused.value)
-
-
-def test_an_asset_without_animations_has_no_pose(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no animation 'a'. It has none."):
-        at(square_builder(), tmp_path, "a@0")
-
-
-def test_formats_without_animations_have_no_pose(corner: Path) -> None:
-    with pytest.raises(InputError, match=r"animations are read from glTF alone"):
-        aobake.load(corner, pose="a@0")
-
-
-ONE = [[0, 0, 0]]
-
-
-@pytest.mark.parametrize(
-    ("channel", "words"),
-    [
-        (moving("translation", [1, 0], ONE * 2), "run backwards"),
-        (moving("translation", [0, np.nan], ONE * 2), "not finite"),
-        (moving("translation", [0, 1], ONE * 3), "3 values for 2 keys"),
-        (moving("translation", [0, 1], ONE * 2, how="CUBICSPLINE"), "do not go with"),
-        (moving("translation", [0, 1], ONE * 2, how="BEZIER"), "LINEAR, STEP, CUBICSPLINE exist"),
-        (moving("translation", [0], [[0, 0, np.inf]]), "a translation is not finite"),
-        (moving("rotation", [0], ONE), "VEC4 is needed"),
-        (moving("weights", [0, 1], [0.0, 0.0, 0.0]), "3 values for 2 keys"),
-        (moving("translation", [0], ONE) | {"node": 5}, "the file has 1 nodes"),
-    ],
-)
-def test_clips_that_cannot_be_read_are_refused_in_one_line(
-    tmp_path: Path, channel: dict[str, Any], words: str
-) -> None:
-    builder = square_builder()
-    animate(builder, "a", channel)
-    with pytest.raises(InputError) as refused:
-        at(builder, tmp_path, "a@0")
-    assert one_line(f"{refused.value}\n", "a.glb", words)
-
-
-def test_a_sampler_without_keys_is_refused(tmp_path: Path) -> None:
-    builder = sliding_square()
-    builder.json["accessors"][builder.json["animations"][0]["samplers"][0]["input"]]["count"] = 0
-    with pytest.raises(InputError, match="sampler 0 has no keys"):
-        at(builder, tmp_path, "0@0")
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"samplers": []}, "sampler is 0, and the file has 0 samplers"),
-        ({"channels": []}, "has no channels"),
-        ({"channels": [{"sampler": 0}]}, "target is missing"),
-        ({"channels": [{"sampler": 0, "target": {"node": 0}}]}, "path is missing"),
-        ({"samplers": [{"output": 0}]}, "input is missing"),
-    ],
-)
-def test_broken_json_of_clips_is_refused(
-    tmp_path: Path, change: dict[str, Any], words: str
-) -> None:
-    builder = sliding_square()
-    builder.json["animations"][0] |= change
-    with pytest.raises(InputError, match=words):
-        at(builder, tmp_path, "0@0")
-
-
-def test_a_node_with_a_matrix_cannot_be_animated(tmp_path: Path) -> None:
-    builder = sliding_square()
-    del builder.json["nodes"][0]["translation"]
-    builder.json["nodes"][0]["matrix"] = np.eye(4).reshape(-1).tolist()
-    with pytest.raises(InputError, match="node 0 has a matrix"):
-        at(builder, tmp_path, "0@0")
-
-
-@pytest.mark.timeout(30)
-def test_whatever_is_done_to_a_clip_it_is_read_or_refused_in_one_line(tmp_path: Path) -> None:
-    rng = random.Random(5)
-    builder = hinge()
-    path, data = tmp_path / "a.glb", bytes(builder.data)
-    whole = builder.with_buffer()
-    kept = {"animations", "accessors", "nodes"}  # what is damaged
-    refusals = 0
-    for _ in range(400):
-        damaged = damaged_json({name: whole[name] for name in kept}, rng)
-        path.write_bytes(pack_glb({**whole, **damaged}, data))
-        line = refused(partial(aobake.load, path, pose="0@1"))
-        assert not line or one_line(f"{line}\n", "a.glb")
-        refusals += bool(line)
-    assert 20 < refusals < 380
-
-
-@pytest.mark.parametrize(
     ("builder", "sentence"),
     [
         (square_builder(), "Nothing in the scene moves."),
@@ -359,27 +195,6 @@ def test_facts_name_the_clips_and_their_length(tmp_path: Path) -> None:
     source = at(builder, tmp_path, None).source
     assert source is not None
     assert source.facts()["animations"] == ['0 "slide" (1.3 s)']
-
-
-FLOOR = patch((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), 2, 2)
-CENTRE = 4  # of the floor's nine vertices
-FLAP = patch((-1, 0, 0), (0, 0, 0), (0, 1, 0), (-1, 1, 0), 2, 2)
-UPRIGHT = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]  # a quarter turn about +y
-
-
-def hinge() -> Builder:
-    """A floor, and a flap beside it that turns upright in 1.5 s and lies over the floor after 3."""
-    builder = Builder()
-    nodes = []
-    for name, part in (("flap", FLAP), ("floor", FLOOR)):
-        mesh = builder.mesh(builder.primitive(part.vertices, part.faces.reshape(-1)), name=name)
-        nodes.append(builder.node(mesh=mesh))
-    animate(
-        builder,
-        "close",
-        moving("rotation", [0, 2], [[0, 0, 0, 1], [0, np.sin(np.pi / 3), 0, np.cos(np.pi / 3)]]),
-    )
-    return builder.show(*nodes)
 
 
 def test_a_hinge_that_turns_is_baked_as_one_that_was_modelled_so(tmp_path: Path) -> None:
