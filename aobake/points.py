@@ -12,7 +12,6 @@ from aobake.meshes.normals import unit_rows
 from aobake.meshes.scene import Instance, Scene
 from aobake.meshes.surface import Surface
 from aobake.prepare import Prepared, turned_normals
-from aobake.tracing.compiled import read_only
 from aobake.tracing.interpolation import interpolate
 from aobake.tracing.rows import any_in_rows
 
@@ -157,7 +156,7 @@ def points_on_faces(
     for number in np.unique(meshes).tolist():
         mesh, surface = scene.meshes[number], prepared.surfaces[number]
         interpolate(
-            (mesh.faces, mesh.vertices, read_only(surface.normals), read_only(surface.detail)),
+            (mesh.faces, mesh.vertices, surface.normals, surface.detail),
             (spaces.linear, spaces.turning, spaces.shift, stretches),
             order[ends[number] : ends[number + 1]],
             instances,

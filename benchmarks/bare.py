@@ -18,9 +18,10 @@ from aobake.meshes.surfaces import surfaces_of
 from aobake.points import vertex_points
 from aobake.prepare import build
 from aobake.tracing import embree, kernels, origins
-from aobake.tracing.compiled import aligned, tight_kernel
+from aobake.tracing.compiled import aligned, kernel
 from aobake.tracing.contacts import note_triangle
 from aobake.tracing.estimate import processors
+from aobake.tracing.foreign import call_packet
 from aobake.tracing.sampling import direction_sets
 
 __all__ = ["Bare"]
@@ -28,7 +29,7 @@ __all__ = ["Bare"]
 PACKETS = 1 << 15  # ready-made at a time and thread: 12 MiB
 
 
-@tight_kernel
+@kernel
 def make_packets(origin, normal, numbers, sets, frame, packets):
     """Fill packets (N, 96) with all rays of some points, as kernels.trace makes them."""
     n = 0
@@ -37,17 +38,17 @@ def make_packets(origin, normal, numbers, sets, frame, packets):
         kernels.turned_frame(normal[point], bits, frame)
         chosen = sets[np.int64(bits & np.uint64(len(sets) - 1))]
         for number in range(len(chosen)):
-            kernels.ready(packets[n], packets[n].view(np.int32))
-            kernels.set_out(packets[n], origin[point])
-            kernels.aim(packets[n], chosen[number], frame, np.float32(np.inf))
+            kernels.ready(packets[n], packets[n].view(np.int32), 8, 0)
+            kernels.set_out(packets[n], origin[point], 8, 0)
+            kernels.aim(packets[n], chosen[number], frame, np.float32(np.inf), 8, 0)
             n += 1
 
 
-@tight_kernel
+@kernel
 def trace_packets(function, scene, valid, packets):
     """Nothing but the calls."""
     for n in range(len(packets)):
-        kernels.call_packet(function, valid.ctypes.data, scene, packets[n].ctypes.data)
+        call_packet(function, valid.ctypes.data, scene, packets[n].ctypes.data, 0)
 
 
 class Bare:

@@ -37,51 +37,42 @@ from aobake.points import vertex_points
 from aobake.prepare import build
 from aobake.sharing import first_alike
 from aobake.tracing import embree, kernels
-from aobake.tracing.compiled import tight_kernel
+from aobake.tracing.compiled import kernel
+from aobake.tracing.foreign import call_packet
+from aobake.tracing.lanes import ALL, below, count, eight, put_mask, spread
 from aobake.tracing.sampling import direction_sets
 
 FAR = 1e3  # beyond all that is in a scene
 POINTS = 2000  # of the comparison of kernels, which takes one thread
 
 
-@tight_kernel
-def trace_plainly(function, scene, points, seed, sets, rays, scratch, out):
-    """kernels.trace, its error included, if it could do nothing but occlusion."""
-    packet, words, masks, frame = scratch
+@kernel
+def trace_plainly(functions, scene, points, seed, sets, scratch, out):
+    """kernels.trace, its error included, if it could do nothing but occlusion by whole packets."""
+    packet, words, valid, _, frame = scratch
+    any_hit, _, _, asked = functions
     origins, normals, numbers = points
-    valid, counts = masks[:8], masks[8:16]
-    kernels.ready(packet, words)
+    kernels.ready(packet, words, 8, 0)
+    put_mask(valid, 0, ALL)
     for point in range(len(origins)):
         bits = kernels.mix(seed, numbers[point])
         kernels.turned_frame(normals[point], bits, frame)
-        kernels.set_out(packet, origins[point])
+        kernels.set_out(packet, origins[point], 8, 0)
         chosen = sets[np.int64(bits & np.uint64(len(sets) - 1))]
-        total, rough, counted = 0.0, 0.0, 0
-        apart, whole = 0.0, 0
-        before = -1.0
+        total, rough, apart, before = 0, 0, 0, -1
         for number in range(len(chosen)):
-            kernels.aim(packet, chosen[number], frame, np.float32(np.inf))
-            for k in range(8):
-                counts[k] = -1 if k < rays - 8 * number else 0
-                valid[k] = counts[k]
-            kernels.call_packet(function, masks.ctypes.data, scene, packet.ctypes.data)
-            lanes, inside, squares = 0, 0.0, 0.0
-            for k in range(8):
-                if counts[k] != 0:
-                    value = 1.0 if packet[8 * kernels.FAR + k] >= 0.0 else 0.0
-                    total += value
-                    lanes += 1
-                    inside += value
-                    squares += value * value
-                    if before >= 0.0:
-                        rough += (value - before) * (value - before)
-                    before = value
-            counted += lanes
-            if lanes == 8:
-                apart += 8.0 * squares - inside * inside
-                whole += 1
-        out[point, 0], out[point, 1], out[point, 2] = total, rough, counted
-        out[point, 3], out[point, 4] = apart, whole
+            kernels.aim(packet, chosen[number], frame, np.float32(np.inf), 8, 0)
+            call_packet(any_hit, valid.ctypes.data, scene, packet.ctypes.data, asked)
+            met = below(eight(packet, 8 * kernels.FAR), spread(np.float32(0.0)))
+            inside = 8 - count(met)
+            total += inside
+            apart += inside * (8 - inside)
+            rough += count((met ^ (met << 1)) & (ALL - 1))
+            if before >= 0:
+                rough += (met & 1) ^ before
+            before = met >> 7
+        out[point, 0], out[point, 1], out[point, 2] = total, rough, 8 * len(chosen)
+        out[point, 3], out[point, 4] = apart, len(chosen)
 
 
 def cost_of_nothing(scene: Scene, rays: int, repeats: int) -> list[float]:
@@ -92,19 +83,19 @@ def cost_of_nothing(scene: Scene, rays: int, repeats: int) -> list[float]:
     above = points.positions + 1e-5 * points.normals
     origins = prepared.world.frame.apply(above).astype(np.float32)
     normals, numbers = points.normals.astype(np.float32), points.numbers
-    functions, tree = embree.functions(), prepared.world.tree.address
+    functions, tree = embree.packets(lanes=8), prepared.world.tree.address
     sets, seed = direction_sets(rays), np.uint64(0)
     memory, sums = kernels.scratch(), np.empty((len(origins), kernels.SUMS))
 
     def whole() -> None:
         kernels.trace(
-            (functions.occluded8, functions.intersect8), tree, origins, normals, None, numbers,
+            functions, tree, origins, normals, None, numbers,
             seed, sets, rays, np.float32(np.inf), None, None, memory, sums, None, None,
         )  # fmt: skip
 
     def plain() -> None:
         points = origins, normals, numbers
-        trace_plainly(functions.occluded8, tree, points, seed, sets, rays, memory, sums)
+        trace_plainly(functions, tree, points, seed, sets, memory, sums)
 
     return in_turn(whole, plain, repeats)
 

@@ -27,7 +27,7 @@ from tables import Cell, Spread, Table
 import aobake
 from aobake import bake
 from aobake.tracing import embree, estimate
-from aobake.tracing.compiled import tight_kernel
+from aobake.tracing.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
@@ -133,7 +133,7 @@ def table_of_cases(rays: int) -> Table:
     return Table("Hard cases", columns, rows, {"rays": rays})
 
 
-@tight_kernel
+@kernel
 def plain_origins(positions, normals, offset, origins):
     """Put each origin at p + offset n."""
     for p in range(len(positions)):

@@ -1,6 +1,6 @@
-"""What accuracy costs on six generated assets: the tables of docs/accuracy.md.
+"""What accuracy costs on six generated assets, or on files: the tables of docs/accuracy.md.
 
-    python benchmarks/study.py [--points 1500] [--seeds 3] [--only NAME]
+    python benchmarks/study.py [MESH ...] [--points 1500] [--seeds 3] [--only NAME]
 
 Prints Markdown: slopes, tolerances against fixed numbers of rays, and the overhead of rounds.
 """
@@ -11,6 +11,7 @@ import argparse
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from bodies import bodies
@@ -20,6 +21,7 @@ from tables import Spread, Table
 import aobake
 from aobake.study import Study, measure, needed, study_extent
 from aobake.study.bench import Bench, bench_of
+from aobake.tracing.sampling import SIZES
 
 ROUNDS = 5
 REFERENCE_RAYS = 32_768
@@ -100,15 +102,15 @@ def overhead(scenes: dict[str, aobake.Scene], points: int) -> Table:
 
 
 def in_one_pass(bench: Bench, rays: NDArray[np.int32], seed: int) -> float:
-    """Processor seconds of (P,) rays from the points, which count a little less than a power of two."""
-    sizes = np.where(rays > 0, 2 ** np.ceil(np.log2(np.maximum(rays, 1))), 0).astype(np.int64)
+    """Processor seconds of (P,) rays from the points, each with one set of the next size, for as many rays."""
+    sizes = np.array(SIZES)[np.searchsorted(SIZES, rays)] * (rays > 0)
     spent = 0.0
     for size in np.unique(sizes[sizes > 0]).tolist():
         part = replace(bench, points=bench.points.only(np.flatnonzero(sizes == size)))
         start = time.process_time()
         part.estimates(part.fixed(size, seed))
         spent += time.process_time() - start
-    return spent
+    return spent * float(rays.sum()) / float(sizes.sum())
 
 
 def run(quick: bool) -> Iterator[Table]:
@@ -119,11 +121,15 @@ def run(quick: bool) -> Iterator[Table]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("meshes", nargs="*", type=Path, metavar="MESH", help="instead of bodies")
     parser.add_argument("--points", type=int, default=1500)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--only")
     asked = parser.parse_args()
-    chosen = {name: s for name, s in bodies().items() if asked.only in {None, name}}
+    if asked.meshes:
+        chosen = {mesh.stem: aobake.load(mesh) for mesh in asked.meshes}
+    else:
+        chosen = {name: s for name, s in bodies().items() if asked.only in {None, name}}
     for table in tables(chosen, asked.points, asked.seeds, REFERENCE_RAYS):
         print(table.markdown(), flush=True)
 

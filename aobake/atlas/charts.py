@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.atlas.dual import Dual, Groups, connected_groups, groups_of
-from aobake.atlas.overlap_kernels import note_overlaps
+from aobake.atlas.overlap_kernels import arena_for, note_overlaps
 from aobake.atlas.partition import parts_of
 from aobake.meshes.scene import FloatArray, IntArray
 
@@ -102,7 +102,8 @@ def _without_overlaps(dual: Dual, uv: FloatArray, charts: Groups) -> Groups:
     suspects = charts
     while len(suspects):
         over = np.zeros(len(suspects), bool)
-        note_overlaps(uv, suspects.order, suspects.starts, TOLERANCE, over)
+        memory = arena_for(int(suspects.sizes().max()))
+        note_overlaps(memory, uv, suspects.order, suspects.starts, TOLERANCE, over)
         halves = np.full(len(of), -1, np.int32)
         for number, group in enumerate(np.flatnonzero(over)):
             faces = suspects.faces(int(group))

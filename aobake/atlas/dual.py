@@ -76,7 +76,7 @@ def groups_of(of: IntArray, count: int) -> Groups:
 def connected_groups(dual: Dual, of: IntArray) -> Groups:
     """The parts of each group (F,) that are connected across edges; -1: in no group."""
     label = np.empty(len(of), np.int32)
-    return groups_of(label, connected(dual.opposite, of, label))
+    return groups_of(label, connected(dual.opposite, of, np.empty_like(label), label))
 
 
 def dual_of(vertices: FloatArray, faces: IntArray) -> Dual:

@@ -120,7 +120,7 @@ def chart_numbers(corners: FloatArray, faces: IntArray, usable: NDArray[np.bool_
     across[order] = np.where(same, following, first[order])  # and form a ring
     numbers = np.full(len(faces), -1, np.int32)
     found = np.full(len(chosen), -1, np.int32)
-    connected(across.reshape(-1, 3), np.zeros(len(chosen), np.int32), found)
+    connected(across.reshape(-1, 3), np.zeros(len(chosen), np.int32), np.empty_like(found), found)
     numbers[chosen] = found
     return numbers
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aobake.tracing.compiled import inlined, tight_kernel
+from aobake.tracing.compiled import inlined, kernel
 
 __all__ = ["DEEPEST", "ROOM", "find_partners"]
 
@@ -18,7 +18,7 @@ ROOM = 8  # for the lists of a row of halvings; a box whose halves have no room 
 WORTH_IT = 0.8  # of the pairs of a box may be left in its halves; many triangles can lie in both
 
 
-@tight_kernel
+@kernel
 def find_partners(corners, boxes, depths, deep, listed, stack, partner):
     """Note for each triangle the first one found that it lies on, in partner (N,) int32, -1 at first.
 

@@ -11,146 +11,63 @@ quasi-Newton for distortion optimization, 2018), never so far that a triangle fl
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from aobake.atlas.laplacian_kernels import laplacian_of, solve
 from aobake.atlas.topology_kernels import border_loop, glued, opened
-from aobake.tracing.compiled import inlined, kernel, routine
+from aobake.tracing.arena import give_back, reserved, taken, zeros
+from aobake.tracing.compiled import inlined, kernel
 from aobake.tracing.vectors import cross, dot, length, minus, row
 
-__all__ = ["flatten_pieces"]
+__all__ = ["arena_for", "flatten_pieces"]
 
 LEAST_WEIGHT, MOST_WEIGHT = 0.05, 20.0  # of Tutte's means, where cotangents may be negative or huge
 STEPS, HISTORY = 60, 6
 SETTLED = 0.01  # share of the energy above an isometry's (or of 2% of it): less is the last step
 EXACT = 1e-12  # share of an isometry's energy that is no more worth a step
-ROUGHLY = 200  # rounds of conjugate gradients to precondition a step: needles would take thousands
 STIFFER = 0.25  # what the energy's Hessian is, roughly, beside four times the Laplacian
+CORNER_BYTES, MOST_TAKEN = 560, 48  # memory for a piece: 550 bytes a corner, in 40 arrays
 BACK = 0.9  # of the way to the first flip that a step may go
 
 
+def arena_for(most: int) -> NDArray[np.uint8]:
+    """Memory to lay pieces of at most so many faces flat, one after the other, in one thread."""
+    return reserved(CORNER_BYTES * 3 * most, MOST_TAKEN)
+
+
 @inlined
-def _cotangent(vertices, a, b, c):
-    """Of the angle at a between b and c."""
-    u, v = minus(row(vertices, b), row(vertices, a)), minus(row(vertices, c), row(vertices, a))
-    area = length(cross(u, v))
-    return dot(u, v) / area if area > 0.0 else 0.0
-
-
-@routine
-def _laplacian(vertices, corners, across, vertex_of, count):
-    """Cotangent weights in compressed rows: start (n + 1,), other, weight, and the diagonal (n,).
-
-    Source: U. Pinkall, K. Polthier, Computing discrete minimal surfaces, 1993.
-    """
-    start = np.zeros(count + 1, np.int32)
-    for h in range(len(across)):
-        v, w = vertex_of[h], vertex_of[h - h % 3 + (h + 1) % 3]
-        start[v + 1] += 1
-        if across[h] < 0:
-            start[w + 1] += 1
-    for v in range(count):
-        start[v + 1] += start[v]
-    other, weight = np.empty(start[count], np.int32), np.empty(start[count])
-    filled, diagonal = start[:-1].copy(), np.zeros(count)
-    for h in range(len(across)):
-        first = h - h % 3
-        v, w = vertex_of[h], vertex_of[first + (h + 1) % 3]
-        cot = 0.5 * _cotangent(
-            vertices, corners[first + (h + 2) % 3], corners[h], corners[first + (h + 1) % 3]
-        )
-        if across[h] >= 0:
-            g = across[h]
-            base = g - g % 3
-            cot += 0.5 * _cotangent(
-                vertices, corners[base + (g + 2) % 3], corners[g], corners[base + (g + 1) % 3]
-            )
-        other[filled[v]], weight[filled[v]] = w, cot
-        filled[v] += 1
-        diagonal[v] += cot
-        if across[h] < 0:
-            other[filled[w]], weight[filled[w]] = v, cot
-            filled[w] += 1
-            diagonal[w] += cot
-    return start, other, weight, diagonal
-
-
-@routine
-def _solve(  # noqa: C901, PLR0912 - loops over rows, spelled out for the compiler
-    start, other, weight, diagonal, fixed, right, x, tolerance
-):
-    """Conjugate gradients, preconditioned by the diagonal, on x (n, 2) in place; fixed rows stay."""
-    count = len(x)
-    r, p, ap = np.zeros((count, 2)), np.zeros((count, 2)), np.zeros((count, 2))
-    size, goal = 0.0, 0.0
-    for v in range(count):
-        if not fixed[v]:
-            a0, a1 = diagonal[v] * x[v, 0], diagonal[v] * x[v, 1]
-            for e in range(start[v], start[v + 1]):
-                a0 -= weight[e] * x[other[e], 0]
-                a1 -= weight[e] * x[other[e], 1]
-            r[v, 0], r[v, 1] = right[v, 0] - a0, right[v, 1] - a1
-            p[v, 0], p[v, 1] = r[v, 0] / diagonal[v], r[v, 1] / diagonal[v]
-            size += r[v, 0] * p[v, 0] + r[v, 1] * p[v, 1]
-    goal = size * tolerance * tolerance
-    for _ in range(ROUGHLY if tolerance > 1e-3 else 20 * count):
-        if not size > goal:
-            break
-        bent = 0.0
-        for v in range(count):
-            if not fixed[v]:
-                a0, a1 = diagonal[v] * p[v, 0], diagonal[v] * p[v, 1]
-                for e in range(start[v], start[v + 1]):
-                    a0 -= weight[e] * p[other[e], 0]
-                    a1 -= weight[e] * p[other[e], 1]
-                ap[v, 0], ap[v, 1] = a0, a1
-                bent += p[v, 0] * a0 + p[v, 1] * a1
-        if not bent > 0.0:
-            break
-        alpha, new = size / bent, 0.0
-        for v in range(count):
-            if not fixed[v]:
-                for k in range(2):
-                    x[v, k] += alpha * p[v, k]
-                    r[v, k] -= alpha * ap[v, k]
-                    new += r[v, k] * r[v, k] / diagonal[v]
-        beta = new / size
-        for v in range(count):
-            if not fixed[v]:
-                for k in range(2):
-                    p[v, k] = r[v, k] / diagonal[v] + beta * p[v, k]
-        size = new
-
-
-@routine
-def _on_circle(vertices, corners, vertex_of, across, loop, start, other, weight, count, area):
-    """(n, 2) Tutte's embedding in a circle of the piece's area, the border spaced by its lengths."""
-    x, fixed = np.zeros((count, 2)), np.zeros(count, np.bool_)
-    whole = 0.0
-    for h in loop:
+def _set_on_circle(arena, vertices, corners, vertex_of, loop, border, laplacian, area, x):
+    """Fill x (n, 2): Tutte's embedding in a circle of the piece's area, the border spaced by its lengths."""
+    start, other, weight, count = laplacian[0], laplacian[1], laplacian[2], len(x)
+    fixed, whole = zeros(arena, count, np.bool_), 0.0
+    for n in range(border):
+        h = loop[n]
         whole += length(
             minus(row(vertices, corners[h - h % 3 + (h + 1) % 3]), row(vertices, corners[h]))
         )
     along, radius = 0.0, np.sqrt(area / np.pi)
-    for h in loop:
+    for n in range(border):
+        h = loop[n]
         v = vertex_of[h]
         angle = 2.0 * np.pi * along / whole
         x[v, 0], x[v, 1], fixed[v] = radius * np.cos(angle), radius * np.sin(angle), True
         along += length(
             minus(row(vertices, corners[h - h % 3 + (h + 1) % 3]), row(vertices, corners[h]))
         )
-    positive, diagonal = np.empty(len(weight)), np.zeros(count)
+    positive, diagonal = zeros(arena, len(weight), np.float64), zeros(arena, count, np.float64)
     for v in range(count):
         for e in range(start[v], start[v + 1]):
             positive[e] = min(max(weight[e], LEAST_WEIGHT), MOST_WEIGHT)
             diagonal[v] += positive[e]
-    _solve(start, other, positive, diagonal, fixed, np.zeros((count, 2)), x, 1e-9)
-    return x
+    right = zeros(arena, (count, 2), np.float64)
+    solve(arena, start, other, positive, diagonal, fixed, right, x, 1e-9)
 
 
-@routine
-def _rest_shapes(vertices, corners):
+@inlined
+def _rest_shapes(arena, vertices, corners):
     """Per triangle: the inverse of its edges laid into the plane (m, 4), and its area (m,)."""
     count = len(corners) // 3
-    inverse, area = np.empty((count, 4)), np.empty(count)
+    inverse, area = zeros(arena, (count, 4), np.float64), zeros(arena, count, np.float64)
     for t in range(count):
         a = row(vertices, corners[3 * t])
         u = minus(row(vertices, corners[3 * t + 1]), a)
@@ -255,11 +172,11 @@ def _sum(a, share, b, result):
         result[v, 1] = a[v, 1] + share * b[v, 1]
 
 
-@routine
-def _direct(laplacian, g, moves, turns, kept, q, d):
+@inlined
+def _direct(arena, laplacian, g, moves, turns, kept, q, d):
     """Fill d (n, 2): minus the inverse Hessian, as L-BFGS knows it, times g. Source: J. Nocedal, 1980."""
     start, other, weight, diagonal, free = laplacian
-    alpha = np.zeros(HISTORY)
+    mark, alpha = taken(arena), zeros(arena, HISTORY, np.float64)
     most = min(kept, HISTORY)
     _sum(g, 0.0, g, q)
     for back in range(most):
@@ -269,25 +186,29 @@ def _direct(laplacian, g, moves, turns, kept, q, d):
     for v in range(len(d)):
         d[v, 0] = d[v, 1] = 0.0
         q[v, 0], q[v, 1] = -STIFFER * q[v, 0], -STIFFER * q[v, 1]
-    _solve(start, other, weight, diagonal, free, q, d, 1e-2)
+    solve(arena, start, other, weight, diagonal, free, q, d, 1e-2)
     for forth in range(most):
         n = (kept - most + forth) % HISTORY
         share = alpha[n] + _dot(turns[n], d) / _dot(moves[n], turns[n])
         _sum(d, -share, moves[n], d)
+    give_back(arena, mark)
 
 
-@routine
-def _relax(x, vertex_of, inverse, area, laplacian):
+@inlined
+def _relax(arena, x, vertex_of, inverse, area, laplacian):
     """Lower the energy of x (n, 2) in place until it settles."""
-    g, new_g, q, d = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
-    there = np.zeros_like(x)
-    moves, turns = np.zeros((HISTORY, len(x), 2)), np.zeros((HISTORY, len(x), 2))
+    size = (len(x), 2)
+    g, new_g = zeros(arena, size, np.float64), zeros(arena, size, np.float64)
+    q, d = zeros(arena, size, np.float64), zeros(arena, size, np.float64)
+    there = zeros(arena, size, np.float64)
+    moves = zeros(arena, (HISTORY, len(x), 2), np.float64)
+    turns = zeros(arena, (HISTORY, len(x), 2), np.float64)
     energy, kept, isometric = _energy(x, vertex_of, inverse, area), np.int64(0), 0.0
     for t in range(len(area)):
         isometric += 4.0 * area[t]
     _slope(x, vertex_of, inverse, area, g)
     for _ in range(STEPS):
-        _direct(laplacian, g, moves, turns, kept, q, d)
+        _direct(arena, laplacian, g, moves, turns, kept, q, d)
         down = _dot(d, g)
         if not down < 0.0:
             if kept == 0:
@@ -316,28 +237,29 @@ def _relax(x, vertex_of, inverse, area, laplacian):
             break
 
 
-@routine
-def _flatten(vertices, corners, across, uv):
+@inlined
+def _flatten(arena, vertices, corners, across, uv):
     """Lay one piece into the plane: fill uv (3 m, 2) and return its L2 stretch, or infinity.
 
     corners : (3 m,) int32 vertex of each corner
     across : (3 m,) int32 the half-edge beyond each, or -1
     """
-    vertex_of, count = glued(across)
-    if not opened(across, vertex_of, count):
+    vertex_of, count = glued(arena, across)
+    if not opened(arena, across, vertex_of, count):
         return np.inf
-    vertex_of, count = glued(across)
-    loop = border_loop(across)
-    inverse, area = _rest_shapes(vertices, corners)
-    start, other, weight, diagonal = _laplacian(vertices, corners, across, vertex_of, count)
+    vertex_of, count = glued(arena, across)
+    loop = zeros(arena, len(across), np.int32)
+    border = border_loop(across, loop)
+    inverse, area = _rest_shapes(arena, vertices, corners)
+    laplacian = laplacian_of(arena, vertices, corners, across, vertex_of, count)
     whole = 0.0
     for t in range(len(area)):
         whole += area[t]
-    x = _on_circle(vertices, corners, vertex_of, across, loop, start, other, weight, count, whole)
+    x = zeros(arena, (count, 2), np.float64)
+    _set_on_circle(arena, vertices, corners, vertex_of, loop, border, laplacian, whole, x)
     if not _energy(x, vertex_of, inverse, area) < np.inf:
         return np.inf
-    free = np.zeros(count, np.bool_)
-    _relax(x, vertex_of, inverse, area, (start, other, weight, diagonal, free))
+    _relax(arena, x, vertex_of, inverse, area, laplacian)
     stretched, covered = 0.0, 0.0
     for t in range(len(area)):
         a, b, c, d = _jacobian(x, vertex_of, inverse, t)
@@ -351,15 +273,20 @@ def _flatten(vertices, corners, across, uv):
 
 
 @kernel
-def flatten_pieces(vertices, faces, opposite, order, starts, slot, piece, first, last, uv, stretch):
+def flatten_pieces(
+    arena, vertices, faces, opposite, order, starts, slot, piece, first, last, uv, stretch
+):
     """Fill uv (F, 3, 2) and stretch (pieces,) of pieces first to last.
 
+    arena : of arena_for
     order, starts : the faces of piece p are order[starts[p] : starts[p + 1]]
     slot, piece : (F,) int32 the place of a face within its piece, and which piece that is
     """
     for p in range(first, last):
         chosen = order[starts[p] : starts[p + 1]]
-        corners, across = np.empty(3 * len(chosen), np.int32), np.empty(3 * len(chosen), np.int32)
+        mark = taken(arena)
+        corners = zeros(arena, 3 * len(chosen), np.int32)
+        across = zeros(arena, 3 * len(chosen), np.int32)
         for n in range(len(chosen)):
             f = chosen[n]
             for k in range(3):
@@ -367,10 +294,11 @@ def flatten_pieces(vertices, faces, opposite, order, starts, slot, piece, first,
                 h = opposite[f, k]
                 beyond = h >= 0 and piece[h // 3] == p
                 across[3 * n + k] = 3 * slot[h // 3] + h % 3 if beyond else -1
-        flat = np.empty((3 * len(chosen), 2))
-        stretch[p] = _flatten(vertices, corners, across, flat)
+        flat = zeros(arena, (3 * len(chosen), 2), np.float64)
+        stretch[p] = _flatten(arena, vertices, corners, across, flat)
         if stretch[p] < np.inf:
             for n in range(len(chosen)):
                 for k in range(3):
                     uv[chosen[n], k, 0] = flat[3 * n + k, 0]
                     uv[chosen[n], k, 1] = flat[3 * n + k, 1]
+        give_back(arena, mark)

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from aobake.tracing.compiled import inlined, kernel, routine
+from aobake.tracing.arena import give_back, reserved, taken, zeros
+from aobake.tracing.compiled import inlined, kernel
 
-__all__ = ["note_overlaps"]
+__all__ = ["arena_for", "note_overlaps"]
 
 MOST_CELLS = 32  # that a triangle is entered in, on average; a coarser grid else
+
+
+def arena_for(most: int) -> NDArray[np.uint8]:
+    """Memory to look at charts of at most so many triangles, one after the other."""
+    cells = (int((2.0 * most) ** 0.5) + 1) ** 2
+    return reserved(16 * (cells + 1) + 4 * MOST_CELLS * most, 3)
 
 
 @inlined
@@ -40,8 +48,8 @@ def _cells(uv, f, low_u, low_v, size, cells):
     )
 
 
-@routine
-def _overlaps(uv, chosen, tolerance):  # noqa: C901, PLR0912 - a grid is filled and looked up at once
+@inlined
+def _overlaps(arena, uv, chosen, tolerance):  # noqa: C901, PLR0912 - a grid is filled and looked up at once
     """Whether any two of the chosen triangles overlap by more than a share of the whole."""
     low_u = low_v = np.inf
     high_u = high_v = -np.inf
@@ -54,7 +62,8 @@ def _overlaps(uv, chosen, tolerance):  # noqa: C901, PLR0912 - a grid is filled 
         return False
     cells, entries = int(np.sqrt(2.0 * len(chosen))) + 1, np.int64(0)
     while True:
-        start, entries = np.zeros(cells * cells + 1, np.int64), np.int64(0)
+        mark, entries = taken(arena), np.int64(0)
+        start = zeros(arena, cells * cells + 1, np.int64)
         for f in chosen:
             c0, c1, r0, r1 = _cells(uv, f, low_u, low_v, size, cells)
             entries += (c1 - c0 + 1) * (r1 - r0 + 1)
@@ -63,16 +72,20 @@ def _overlaps(uv, chosen, tolerance):  # noqa: C901, PLR0912 - a grid is filled 
                     start[r * cells + c + 1] += 1
         if entries <= MOST_CELLS * len(chosen) or cells == 1:
             break
+        give_back(arena, mark)
         cells = (cells + 1) // 2
     for n in range(cells * cells):
         start[n + 1] += start[n]
-    filled, entry = start[:-1].copy(), np.empty(entries, np.int32)
+    filled, entry = zeros(arena, cells * cells, np.int64), zeros(arena, entries, np.int32)
+    for n in range(cells * cells):
+        filled[n] = start[n]
     for f in chosen:
         c0, c1, r0, r1 = _cells(uv, f, low_u, low_v, size, cells)
         for r in range(r0, r1 + 1):
             for c in range(c0, c1 + 1):
                 n = r * cells + c
-                for other in entry[start[n] : filled[n]]:
+                for k in range(start[n], filled[n]):
+                    other = entry[k]
                     if not _apart(uv, f, other, tolerance * size) and not _apart(
                         uv, other, f, tolerance * size
                     ):
@@ -83,7 +96,7 @@ def _overlaps(uv, chosen, tolerance):  # noqa: C901, PLR0912 - a grid is filled 
 
 
 @kernel
-def note_overlaps(uv, order, starts, tolerance, found):
+def note_overlaps(arena, uv, order, starts, tolerance, found):
     """Fill found (charts,) bool: whether two triangles of a chart overlap.
 
     uv : (F, 3, 2) float64, triangles that turn left; thinner ones than `tolerance` overlap nothing
@@ -91,4 +104,6 @@ def note_overlaps(uv, order, starts, tolerance, found):
     tolerance : share of the chart's size by which triangles may overlap
     """
     for c in range(len(found)):
-        found[c] = _overlaps(uv, order[starts[c] : starts[c + 1]], tolerance)
+        mark = taken(arena)
+        found[c] = _overlaps(arena, uv, order[starts[c] : starts[c + 1]], tolerance)
+        give_back(arena, mark)

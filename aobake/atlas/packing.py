@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.atlas.charts import counted
-from aobake.atlas.packing_kernels import place_charts, set_upright
+from aobake.atlas.packing_kernels import hull_arena, page_arena, place_charts, set_upright
 from aobake.atlas.unwrap import Charts
 from aobake.errors import InputError
 from aobake.meshes.scene import FloatArray, IntArray
@@ -122,7 +122,7 @@ def _outlines(placed: Sequence[tuple[Charts, float]]) -> _Outlines:
     order = order[np.searchsorted(owner[order], 0) :]
     starts = np.searchsorted(owner[order], np.arange(count + 1))
     upright, extent = at[order], np.zeros((count, 2))
-    set_upright(upright, starts, extent)
+    set_upright(hull_arena(int(np.diff(starts).max(initial=0))), upright, starts, extent)
     at[order] = upright
     corners = np.concatenate([np.zeros((0, 3), np.int32), *triangles]).astype(np.int32)
     chart = np.concatenate([np.zeros(0, np.int32), *triangle_of])
@@ -201,7 +201,7 @@ def _placed(outlines: _Outlines, size: int, padding: int, scale: float) -> _Plac
     page = (size // cell, -(-padding // cell), -(-border // cell))
     places: IntArray = np.zeros((len(outlines.extent), 3), np.int32)
     covered = place_charts(
-        outlines.points, outlines.triangles, outlines.starts, outlines.extent,
+        page_arena(page), outlines.points, outlines.triangles, outlines.starts, outlines.extent,
         outlines.sequence, scale, page, places,
     )  # fmt: skip
     return None if covered < 0 else _Places(places, scale, covered)

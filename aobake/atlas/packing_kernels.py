@@ -8,10 +8,12 @@ row of places is passed in a few jumps.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from aobake.tracing.compiled import kernel, routine
+from aobake.tracing.arena import give_back, reserved, taken, zeros
+from aobake.tracing.compiled import inlined, kernel
 
-__all__ = ["place_charts", "set_upright"]
+__all__ = ["hull_arena", "page_arena", "place_charts", "set_upright"]
 
 TOUCH = 1e-7  # cells: a triangle that ends on a line between two cells does not enter the second
 TURNS = 4
@@ -20,10 +22,24 @@ ALIKE = (
 )
 
 
-@routine
-def _hull(points):
-    """Corners of the convex hull of points in ascending order. Source: A. Andrew, 1979. Needs two points."""
-    hull, count = np.empty((2 * len(points) + 1, 2)), 0
+def hull_arena(most: int) -> NDArray[np.uint8]:
+    """Memory for set_upright, for charts of at most so many points."""
+    return reserved(16 * (2 * most + 1), 1)
+
+
+def page_arena(page: tuple[int, int, int]) -> NDArray[np.uint8]:
+    """Memory for place_charts on such a page: five bytes a cell for it, and twelve for a chart of its size."""
+    width = page[0] + 2 * page[1] + 1
+    return reserved(17 * width * width + 64, 16)
+
+
+@inlined
+def _surround(points, hull):
+    """Fill in the corners of the convex hull of two or more points in ascending order; how many they are.
+
+    Source: A. Andrew, 1979.
+    """
+    count = 0
     for way in range(2):
         least = count + 1
         for n in range(len(points)):
@@ -36,11 +52,11 @@ def _hull(points):
             hull[count, 0], hull[count, 1] = x, y
             count += 1
         count -= 1
-    return hull[:count]
+    return count
 
 
 @kernel
-def set_upright(points, starts, extent):
+def set_upright(arena, points, starts, extent):
     """Turn each chart into its tightest box, in place, the box at the origin; fill extent (charts, 2).
 
     points : (P, 2) float64; those of chart c are points[starts[c] : starts[c + 1]],
@@ -49,16 +65,18 @@ def set_upright(points, starts, extent):
     """
     for c in range(len(extent)):
         own = points[starts[c] : starts[c + 1]]
-        hull, best, cos, sin = _hull(own), np.inf, 1.0, 0.0
-        for n in range(len(hull)):
-            m = n + 1 if n + 1 < len(hull) else 0
+        mark = taken(arena)
+        hull = zeros(arena, (2 * len(own) + 1, 2), np.float64)
+        corners, best, cos, sin = _surround(own, hull), np.inf, 1.0, 0.0
+        for n in range(corners):
+            m = n + 1 if n + 1 < corners else 0
             x, y = hull[m, 0] - hull[n, 0], hull[m, 1] - hull[n, 1]
             size = np.sqrt(x * x + y * y)
             if not size > 0.0:
                 continue
             x, y = x / size, y / size
             low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
-            for k in range(len(hull)):
+            for k in range(corners):
                 u, v = x * hull[k, 0] + y * hull[k, 1], x * hull[k, 1] - y * hull[k, 0]
                 low_u, high_u, low_v, high_v = (
                     min(low_u, u),
@@ -84,13 +102,14 @@ def set_upright(points, starts, extent):
             own[k, 0] -= low_u
             own[k, 1] -= low_v
         extent[c, 0], extent[c, 1] = high_u - low_u, high_v - low_v
+        give_back(arena, mark)
 
 
-@routine
-def _touched(points, triangles, scale, shift_x, shift_y, mask):
+@inlined
+def _touched(arena, points, triangles, scale, shift_x, shift_y, mask):
     """Set the cells of mask (h, w) that triangles touch; points are scaled and shifted to cells."""
     h, w = mask.shape
-    x, y = np.empty(3), np.empty(3)
+    x, y = zeros(arena, 3, np.float64), zeros(arena, 3, np.float64)
     for t in range(len(triangles)):
         low_y, high_y = np.inf, -np.inf
         for k in range(3):
@@ -118,24 +137,27 @@ def _touched(points, triangles, scale, shift_x, shift_y, mask):
                 mask[r, c] = True
 
 
-@routine
-def _turned(mask, turn):
-    """The mask after quarter turns that take (x, y) to (-y, x)."""
-    for _ in range(turn):
-        h, w = mask.shape
-        new = np.empty((w, h), np.bool_)
-        for r in range(h):
-            for c in range(w):
-                new[c, h - 1 - r] = mask[r, c]
-        mask = new
-    return mask
-
-
-@routine
-def _widened(mask, by):
-    """The mask (h, w) grown by some cells to all sides: (h + 2 by, w + 2 by)."""
+@inlined
+def _turn(mask, turn, new):
+    """Fill in the mask after quarter turns that take (x, y) to (-y, x)."""
     h, w = mask.shape
-    wide = np.zeros((h, w + 2 * by), np.bool_)
+    for r in range(h):
+        for c in range(w):
+            row, column = r, c
+            if turn == 1:
+                row, column = c, h - 1 - r
+            elif turn == 2:
+                row, column = h - 1 - r, w - 1 - c
+            elif turn == 3:
+                row, column = w - 1 - c, r
+            new[row, column] = mask[r, c]
+
+
+@inlined
+def _widen(arena, mask, by, grown):
+    """Fill in, in zeros (h + 2 by, w + 2 by), the mask (h, w) grown by some cells to all sides."""
+    h, w = mask.shape
+    wide = zeros(arena, (h, w + 2 * by), np.bool_)
     for r in range(h):
         last = -1  # column up to which the row is set
         for c in range(w):
@@ -143,8 +165,7 @@ def _widened(mask, by):
                 for n in range(max(c, last + 1), c + 2 * by + 1):
                     wide[r, n] = True
                 last = c + 2 * by
-    grown = np.zeros((h + 2 * by, w + 2 * by), np.bool_)
-    left = np.zeros(w + 2 * by, np.int32)  # rows for which a column stays set
+    left = zeros(arena, w + 2 * by, np.int32)  # rows for which a column stays set
     for r in range(h + 2 * by):
         for c in range(w + 2 * by):
             if r < h and wide[r, c]:
@@ -152,14 +173,13 @@ def _widened(mask, by):
             if left[c] > 0:
                 grown[r, c] = True
                 left[c] -= 1
-    return grown
 
 
-@routine
-def _spans(mask):
-    """(S, 3) int32 runs of set cells: row, first column, column after the last; the longest one first."""
+@inlined
+def _spans(arena, mask):
+    """((S, 3) int32 runs of set cells: row, first column, column after the last, the longest one first; how many)."""
     h, w = mask.shape
-    spans, count, longest = np.empty((h * (w + 1) // 2 + 1, 3), np.int32), 0, 0
+    spans, count, longest = zeros(arena, (h * (w + 1) // 2 + 1, 3), np.int32), 0, 0
     for r in range(h):
         c = 0
         while c < w:
@@ -175,19 +195,19 @@ def _spans(mask):
                 c += 1
     for k in range(3):
         spans[0, k], spans[longest, k] = spans[longest, k], spans[0, k]
-    return spans[:count]
+    return spans, count
 
 
-@routine
-def _first_place(spans, occupied, free, roomiest, first, first_y, last_x, last_y):
+@inlined
+def _first_place(spans, count, occupied, free, roomiest, first, first_y, last_x, last_y):
     """The first (y, x) from row first_y on at which no span meets an occupied cell; y = -1: there is none."""
     wide = spans[0, 2] - spans[0, 1]
     for y in range(first_y, last_y + 1):
         if roomiest[y + spans[0, 0]] < wide:
             continue
         x, hint, n = first, 0, 0
-        while x <= last_x and n < len(spans):
-            s = (hint + n) % len(spans)
+        while x <= last_x and n < count:
+            s = (hint + n) % count
             begin = x + spans[s, 1]
             row = y + spans[s, 0]
             met = occupied[row, begin]
@@ -200,20 +220,20 @@ def _first_place(spans, occupied, free, roomiest, first, first_y, last_x, last_y
     return -1, -1
 
 
-@routine
-def _occupy(mask, y, x, taken, occupied, free, roomiest):
+@inlined
+def _occupy(mask, y, x, full, occupied, free, roomiest):
     """Enter a mask, and bring the rows' jumps up to date; how many cells it covers."""
     h, w = mask.shape
     covered = 0
-    width = taken.shape[1]
+    width = full.shape[1]
     for r in range(h):
         row = y + r
         for c in range(w):
-            taken[row, x + c] |= mask[r, c]
+            full[row, x + c] |= mask[r, c]
             covered += mask[r, c]
         for c in range(min(x + w, width) - 1, -1, -1):
-            occupied[row, c] = c if taken[row, c] else occupied[row, c + 1]
-            free[row, c] = free[row, c + 1] if taken[row, c] else c
+            occupied[row, c] = c if full[row, c] else occupied[row, c + 1]
+            free[row, c] = free[row, c + 1] if full[row, c] else c
         longest, c = 0, 0
         while c < width:
             c = free[row, c]
@@ -224,7 +244,7 @@ def _occupy(mask, y, x, taken, occupied, free, roomiest):
 
 
 @kernel
-def place_charts(points, triangles, starts, extent, sequence, scale, page, places):
+def place_charts(arena, points, triangles, starts, extent, sequence, scale, page, places):
     """Place charts one after the other; False when one does not fit.
 
     points, triangles : (P, 2) float64 of upright charts, (T, 3) int32 corners
@@ -237,41 +257,54 @@ def place_charts(points, triangles, starts, extent, sequence, scale, page, place
     """
     side, padding, border = page
     width = side + 2 * padding
-    taken = np.zeros((width, width), np.bool_)
-    occupied = np.full((width, width + 1), width, np.int16)
-    free = np.empty((width, width + 1), np.int16)
+    full = zeros(arena, (width, width), np.bool_)
+    occupied = zeros(arena, (width, width + 1), np.int16)
+    free = zeros(arena, (width, width + 1), np.int16)
+    roomiest, covered = zeros(arena, width, np.int16), 0
     for r in range(width):
+        roomiest[r] = width
         for c in range(width + 1):
-            free[r, c] = c
-    roomiest, covered = np.full(width, width, np.int16), 0
+            occupied[r, c], free[r, c] = width, c
     like, first_y = np.inf, border
     for chart in sequence:
         w = max(int(np.ceil(extent[chart, 0] * scale - TOUCH)), 1)
         h = max(int(np.ceil(extent[chart, 1] * scale - TOUCH)), 1)
         if max(w, h) > side - 2 * border:
             return -1
-        upright = np.zeros((h, w), np.bool_)
+        mark = taken(arena)
+        upright = zeros(arena, (h, w), np.bool_)
         _touched(
-            points, triangles[starts[chart] : starts[chart + 1]], scale,
+            arena, points, triangles[starts[chart] : starts[chart + 1]], scale,
             0.5 * (w - extent[chart, 0] * scale), 0.5 * (h - extent[chart, 1] * scale), upright,
         )  # fmt: skip
         if w + h < ALIKE * like:
             like, first_y = w + h, border
         lowest, turn, at_y, at_x = width + 1, -1, 0, 0
         for t in range(TURNS if max(w, h) > 1 else 1):
-            mask = _turned(upright, t)
+            before = taken(arena)
+            mask = zeros(arena, (h, w) if t % 2 == 0 else (w, h), np.bool_)
+            _turn(upright, t, mask)
+            wide = zeros(
+                arena, (mask.shape[0] + 2 * padding, mask.shape[1] + 2 * padding), np.bool_
+            )
+            _widen(arena, mask, padding, wide)
+            spans, count = _spans(arena, wide)
             last_y = min(side - border, lowest - 1) - mask.shape[0]
             y, x = _first_place(
-                _spans(_widened(mask, padding)), occupied, free, roomiest,
+                spans, count, occupied, free, roomiest,
                 border, first_y, side - border - mask.shape[1], last_y,
             )  # fmt: skip
             if y >= 0:
                 lowest, turn, at_y, at_x = y + mask.shape[0], t, y, x
+            give_back(arena, before)
         if turn < 0:
             return -1
         first_y = max(first_y, at_y - max(w, h) // 2)
+        mask = zeros(arena, (h, w) if turn % 2 == 0 else (w, h), np.bool_)
+        _turn(upright, turn, mask)
         covered += _occupy(
-            _turned(upright, turn), at_y + padding, at_x + padding, taken, occupied, free, roomiest
-        )
+            mask, at_y + padding, at_x + padding, full, occupied, free, roomiest,
+        )  # fmt: skip
+        give_back(arena, mark)
         places[chart, 0], places[chart, 1], places[chart, 2] = at_x, at_y, turn
     return covered

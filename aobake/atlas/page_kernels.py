@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from aobake.tracing.compiled import tight_kernel
+from aobake.tracing.compiled import kernel
 
 __all__ = ["NONE", "chart_boxes", "nearest_above_or_below", "nearest_texel"]
 
 NONE = np.int16(32767)  # no covered texel within reach
 
 
-@tight_kernel
+@kernel
 def nearest_above_or_below(covered, reach, offset):
     """Rows from each texel to the nearest covered one of its column; the upper one of two.
 
@@ -34,7 +34,7 @@ def nearest_above_or_below(covered, reach, offset):
                 offset[y, x] = below + 1
 
 
-@tight_kernel
+@kernel
 def nearest_texel(offset, reach, nearest):
     """The nearest covered texel of each texel, by Euclidean distance; the first of several, leftmost column first.
 
@@ -63,7 +63,7 @@ def nearest_texel(offset, reach, nearest):
             nearest[y, x] = found
 
 
-@tight_kernel
+@kernel
 def chart_boxes(chart, boxes, area):
     """The rows and columns that each chart takes, and how many texels.
 

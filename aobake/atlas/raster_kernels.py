@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aobake.tracing.compiled import inlined, tight_kernel
+from aobake.tracing.compiled import inlined, kernel
 
 __all__ = ["TOUCHING", "cover", "locate"]
 
@@ -16,7 +16,7 @@ INWARD = 1.0 / 64.0  # of the way to the middle of its triangle, a clamped point
 INWARD_MOST = 1.0 / 16.0  # but by no more than this, in samples
 
 
-@tight_kernel
+@kernel
 def cover(corners, scale, first_row, reach, nearest, face):
     """Note the nearest triangle at each sample that one comes near to.
 
@@ -44,7 +44,7 @@ def cover(corners, scale, first_row, reach, nearest, face):
                         face[y - first_row, x] = f
 
 
-@tight_kernel
+@kernel
 def locate(corners, face, x, y, weights, inside):
     """Fill weights (T, 2) of corners 1 and 2 at the point of triangle face[i] that is nearest to (x, y)[i],
     and inside (T,), whether that is the place itself. A point that is not is kept off the edge."""

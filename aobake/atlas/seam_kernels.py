@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from aobake.tracing.compiled import tight_kernel
+from aobake.tracing.compiled import kernel
 
 __all__ = ["add_normal_product"]
 
 
-@tight_kernel
+@kernel
 def add_normal_product(texel, weight, x, product):
     """Add A^T A x, where each row of A is one equation.
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aobake.tracing.compiled import inlined, tight_kernel
+from aobake.tracing.compiled import inlined, kernel
 from aobake.tracing.vectors import dot, length, minus
 
 __all__ = ["ANY", "PRESERVING", "UNUSABLE", "sew", "share_tangents"]
@@ -17,7 +17,7 @@ ANY = 2  # they have no area: it goes with whatever group reaches it
 UNUSABLE = 4  # two corners at one place: it takes no part
 
 
-@tight_kernel
+@kernel
 def sew(order, edge, forward, across):
     """Fill across (3 F,) with the half-edge on the other side of each; -1 at first, and for none.
 
@@ -34,7 +34,7 @@ def sew(order, edge, forward, across):
             at += 1
 
 
-@tight_kernel
+@kernel
 def share_tangents(corners, along, state, vertex, across, stack, members, frames):
     """Fill frames (F, 3, 4): the tangent of each corner, zero where there is none, and the sign of its
     bitangent, zero where no group reaches it.

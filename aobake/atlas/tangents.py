@@ -16,7 +16,6 @@ from aobake.meshes.coincident import first_equal_row
 from aobake.meshes.normals import unit_rows
 from aobake.meshes.scene import FloatArray, IntArray
 from aobake.prepare import mirrors
-from aobake.tracing.compiled import read_only
 
 __all__ = ["in_tangent_space", "normal_mapped", "placed_tangents", "tangents_at_corners"]
 
@@ -106,7 +105,7 @@ def _fill(positions: FloatArray, normals: FloatArray, uv: FloatArray, frames: Fl
     vertex = vertex.reshape(-1, 3)
     along, state = _directions(positions, uv)
     share_tangents(
-        read_only(np.concatenate([positions, normals], axis=2)),
+        np.concatenate([positions, normals], axis=2),
         along,
         state,
         vertex,

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from aobake.tracing.compiled import inlined, kernel, routine
+from aobake.tracing.arena import zeros
+from aobake.tracing.compiled import inlined, kernel
 
 __all__ = ["border_loop", "connected", "glued", "opened"]
 
@@ -34,16 +35,18 @@ def _join(parent, one, other):
     parent[max(a, b)] = min(a, b)
 
 
-@routine
-def glued(across):
+@inlined
+def glued(arena, across):
     """(vertex of each corner (3 m,) int32, number of vertices)."""
-    parent = np.arange(len(across)).astype(np.int32)
+    parent = zeros(arena, len(across), np.int32)
+    for c in range(len(across)):
+        parent[c] = c
     for h in range(len(across)):
         g = across[h]
         if g > h:
             _join(parent, h, _next(g))
             _join(parent, _next(h), g)
-    vertex_of, count = np.empty(len(across), np.int32), 0
+    vertex_of, count = zeros(arena, len(across), np.int32), 0
     for c in range(len(across)):
         root = _root(parent, c)
         if root == c:
@@ -54,10 +57,9 @@ def glued(across):
     return vertex_of, count
 
 
-@routine
-def border_loop(across):
-    """Half-edges of the border that the first border half-edge is on, in order; empty if there is none."""
-    loop = np.empty(len(across), np.int32)
+@inlined
+def border_loop(across, loop):
+    """Fill in the half-edges of the border that the first border half-edge is on, in order; how many they are."""
     length = 0
     for first in range(len(across)):
         if across[first] < 0:
@@ -71,11 +73,11 @@ def border_loop(across):
                 if h == first:
                     break
             break
-    return loop[:length]
+    return length
 
 
-@routine
-def opened(across, vertex_of, count):  # noqa: C901 - one cut, from its tree to its last loose end
+@inlined
+def opened(arena, across, vertex_of, count):  # noqa: C901 - one cut, from its tree to its last loose end
     """Cut a connected piece (across, in place) until it is a disc; False for a closed one, left as it is.
 
     What a spanning tree of the faces does not cross is a cut that leaves a disc; its loose ends are
@@ -89,8 +91,9 @@ def opened(across, vertex_of, count):  # noqa: C901 - one cut, from its tree to 
     edges = (len(across) + borders) // 2
     if count - edges + len(across) // 3 == 1:
         return True
-    crossed = _crossed(across)
-    degree, around = np.zeros(count, np.int32), np.zeros(count, np.int32)
+    crossed = zeros(arena, len(across), np.bool_)
+    _cross(arena, across, crossed)
+    degree, around = zeros(arena, count, np.int32), zeros(arena, count, np.int32)
     for h in range(len(across)):
         if across[h] < 0:  # the border is part of the cut: it has no loose end
             degree[vertex_of[h]] += 2
@@ -113,11 +116,11 @@ def opened(across, vertex_of, count):  # noqa: C901 - one cut, from its tree to 
     return True
 
 
-@routine
-def _crossed(across):
-    """(3 m,) bool: the half-edges that a breadth-first tree of the faces crosses."""
-    crossed, seen = np.zeros(len(across), np.bool_), np.zeros(len(across) // 3, np.bool_)
-    queue = np.empty(len(seen), np.int32)
+@inlined
+def _cross(arena, across, crossed):
+    """Set, in crossed (3 m,) bool, the half-edges that a breadth-first tree of the faces crosses."""
+    seen = zeros(arena, len(across) // 3, np.bool_)
+    queue = zeros(arena, len(seen), np.int32)
     queue[0], seen[0], done, waiting = 0, True, 0, 1
     while done < waiting:
         f = queue[done]
@@ -128,18 +131,19 @@ def _crossed(across):
                 seen[g // 3] = crossed[h] = crossed[g] = True
                 queue[waiting] = g // 3
                 waiting += 1
-    return crossed
 
 
 @kernel
-def connected(opposite, group, label):
+def connected(opposite, group, stack, label):
     """Fill label (F,) with numbers of parts, connected across edges, of faces of one group; -1 for group -1.
 
     opposite : (F, 3) int32 half-edge on the other side of each, or -1
+    stack : (F,) int32, scratch
     Returns how many parts there are.
     """
-    count, stack = 0, np.empty(len(group), np.int32)
-    label[:] = -1
+    count = 0
+    for f in range(len(label)):
+        label[f] = -1
     for seed in range(len(group)):
         if group[seed] < 0 or label[seed] >= 0:
             continue

@@ -19,13 +19,12 @@ from numpy.typing import NDArray
 
 from aobake.atlas.charts import mended, projected
 from aobake.atlas.dual import Dual, Groups, connected_groups, dual_of
-from aobake.atlas.flatten_kernels import flatten_pieces
+from aobake.atlas.flatten_kernels import arena_for, flatten_pieces
 from aobake.atlas.partition import parts_of
 from aobake.meshes.coincident import first_equal_row
 from aobake.meshes.scene import FloatArray, IntArray, Mesh
 from aobake.meshes.surface import faces_without_area
 from aobake.settings import AtlasSettings
-from aobake.tracing.compiled import read_only
 from aobake.tracing.estimate import processors
 
 __all__ = ["Charts", "unwrap"]
@@ -108,7 +107,7 @@ def unwrap(
 def _unwrapped(mesh: Mesh, work: _Work) -> Charts:
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(mesh.vertices).all(axis=1))
     clean = np.where(finite[:, None], mesh.vertices, 0.0)
-    flat = faces_without_area(read_only(clean), read_only(mesh.faces.view(np.uint32)))
+    flat = faces_without_area(clean, mesh.faces.view(np.uint32))
     usable = np.flatnonzero(finite[mesh.faces].all(axis=1) & ~flat)
     chart: IntArray = np.full(len(mesh.faces), -1, np.int32)
     uv = np.zeros((len(mesh.faces), 3, 2))
@@ -201,12 +200,12 @@ def _lay_flat(dual: Dual, pieces: Groups, uv: FloatArray, work: _Work) -> FloatA
     bounds = np.unique(np.concatenate([[0], ends, [len(pieces)]]))
 
     def lay(first: int, last: int) -> int:
+        sizes = pieces.sizes()[first:last]
         if not work.late():
             flatten_pieces(
-                dual.vertices, dual.faces, dual.opposite, pieces.order, pieces.starts,
+                arena_for(int(sizes.max())), dual.vertices, dual.faces, dual.opposite, pieces.order, pieces.starts,
                 pieces.slot, pieces.of, first, last, uv, stretch,
             )  # fmt: skip
-        sizes = pieces.sizes()[first:last]
         return int(sizes[stretch[first:last] <= MOST_STRETCH].sum())
 
     pool = ThreadPoolExecutor(work.threads)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.tracing.compiled import inlined, read_only, tight_kernel
+from aobake.tracing.compiled import inlined, kernel
 
 __all__ = ["first_equal_row"]
 
@@ -32,7 +32,7 @@ def first_equal_row(
 
 def _as_bits(column: NDArray[np.float64] | NDArray[np.uint32]) -> NDArray[Any]:
     array: NDArray[Any] = np.ascontiguousarray(column)
-    return read_only(array if array.dtype == np.uint32 else array.view(np.uint64))
+    return array if array.dtype == np.uint32 else array.view(np.uint64)
 
 
 @inlined
@@ -42,7 +42,7 @@ def _bits(value):
     return np.uint64(0) if wide == MINUS_ZERO else wide
 
 
-@tight_kernel
+@kernel
 def _group(a, b, table, first):
     """Fill first (N,); table : a power of two, at least 2 N, of -1.
 

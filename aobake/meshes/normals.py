@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.meshes.coincident import first_equal_row
-from aobake.tracing.compiled import inlined, tight_kernel
+from aobake.tracing.compiled import inlined, kernel
 from aobake.tracing.rows import largest_in_rows
 from aobake.tracing.vectors import cross, dot, largest, length, minus, row, scaled
 
@@ -109,7 +109,7 @@ def _front_and_angles(vertices, faces, f):
     return scaled(normal, sine if sine > 0.0 else 1.0), angles
 
 
-@tight_kernel
+@kernel
 def _add_own(vertices, faces, counts, sums):
     """Add to sums (V, 3) the normals of the faces of each vertex, weighted by their angle there.
 
@@ -124,7 +124,7 @@ def _add_own(vertices, faces, counts, sums):
                     sums[faces[f, k], i] += angles[k] * front[i]
 
 
-@tight_kernel
+@kernel
 def _add_around(  # noqa: PLR0913, PLR0917 - a kernel takes its arrays one by one
     vertices, faces, counts, place, start, corners, own, cosine, sums
 ):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.tracing.compiled import inlined, tight_kernel
+from aobake.tracing.compiled import inlined, kernel
 from aobake.tracing.vectors import cross, dot, length, minus, row
 
 __all__ = ["consistent_winding"]
@@ -76,7 +76,7 @@ def _parts(count: int) -> tuple[NDArray[np.generic], ...]:
     )
 
 
-@tight_kernel
+@kernel
 def _group_edges(faces, place, start, other, edge):
     """Fill what _edges_by_place returns, and sort the lists that are not long.
 
@@ -147,7 +147,7 @@ def _begins_low(faces, place, edge):
     return place[faces[f, k]] < place[faces[f, (k + 1) % 3]]
 
 
-@tight_kernel
+@kernel
 def _settle(vertices, faces, place, edges, parts, turned, inward):
     """Fill turned and inward (F,): a union-find over neighbours that keeps each face's parity.
 

@@ -16,7 +16,7 @@ from aobake.meshes.coincident import first_equal_row
 from aobake.meshes.normals import CREASE_DEGREES, computed_normals, unit_rows
 from aobake.meshes.orientation import consistent_winding
 from aobake.meshes.scene import Mesh
-from aobake.tracing.compiled import read_only, tight_kernel
+from aobake.tracing.compiled import kernel
 from aobake.tracing.conditioning import detail_at_vertices
 from aobake.tracing.rows import any_in_rows, finite_rows
 from aobake.tracing.vectors import cross, dot, largest, length, minus, row, scaled
@@ -58,12 +58,12 @@ def surface_of(mesh: Mesh, name: str = "") -> Surface:
     """
     vertices = mesh.vertices
     finite = finite_rows(vertices)
-    clean = read_only(vertices if finite.all() else np.where(finite[:, None], vertices, 0.0))
-    given = read_only(mesh.faces.view(np.uint32))
+    clean = vertices if finite.all() else np.where(finite[:, None], vertices, 0.0)
+    given = mesh.faces.view(np.uint32)
     flat = faces_without_area(clean, given)
     whole = np.ones(len(given), bool) if finite.all() else finite[given].all(axis=1)
     usable = whole & ~flat
-    faces = read_only(given if usable.all() else given[usable])
+    faces = given if usable.all() else given[usable]
     faces, normals, found = _with_normals(mesh, clean, faces)
     defined = any_in_rows(normals)
     used = np.zeros(len(vertices), bool)
@@ -121,8 +121,7 @@ def _with_normals(
 
 def _turned(faces: NDArray[np.uint32], over: NDArray[np.bool_]) -> NDArray[np.uint32]:
     """Faces, with those marked wound the other way round."""
-    turned = np.where(over[:, None], faces[:, [0, 2, 1]], faces) if over.any() else faces
-    return read_only(turned)
+    return np.where(over[:, None], faces[:, [0, 2, 1]], faces) if over.any() else faces
 
 
 def _first_asked(same_as: NDArray[np.int32], asked: NDArray[np.bool_]) -> NDArray[np.int32]:
@@ -150,7 +149,7 @@ def faces_without_area(vertices: FloatArray, faces: NDArray[np.uint32]) -> NDArr
     return flat
 
 
-@tight_kernel
+@kernel
 def _find_flat(vertices, faces, flat):
     for f in range(len(faces)):
         a = row(vertices, faces[f, 0])
@@ -159,7 +158,7 @@ def _find_flat(vertices, faces, flat):
         flat[f] = not size > 0.0 or not length(cross(scaled(u, size), scaled(v, size))) > 0.0
 
 
-@tight_kernel
+@kernel
 def _look_against(vertices, faces, normals, over):
     for f in range(len(faces)):
         a = row(vertices, faces[f, 0])

@@ -84,13 +84,12 @@ def _traced(tree: embree.Tree, points: FloatArray, axis: int, threads: int) -> F
     up = np.zeros((ROWS_AT_ONCE * count, 3), np.float32)
     up[:, axis] = 1.0
     result = np.empty((count, count), np.float32)
-    functions = embree.functions()
 
     def rows(first: int) -> None:
         part = points[first : first + ROWS_AT_ONCE].reshape(-1, 3).astype(np.float32)
         sums = np.empty((len(part), SUMS))
         trace(
-            (functions.occluded8, functions.intersect8),
+            embree.packets(),
             tree.address,
             part,
             up[: len(part)],

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.shading.stage import Stage
-from aobake.tracing.compiled import read_only
 from aobake.tracing.landing import land, scratch
 from aobake.tracing.primary import Hits
 
@@ -45,7 +44,7 @@ def seen(stage: Stage, hits: Hits, directions: Float32Array) -> Seen:
     normal, origin = np.empty((3, count), np.float32), np.empty((3, count), np.float32)
     front = np.empty(count, bool)
     land(
-        (read_only(stage.vertices), read_only(stage.normals), read_only(stage.faces)),
+        (stage.vertices, stage.normals, stage.faces),
         (stage.first_face, stage.fixed, stage.columns.reshape(-1, 3), stage.shift, stage.sharp),
         (hits.thing, hits.face, hits.weights),
         np.ascontiguousarray(directions),

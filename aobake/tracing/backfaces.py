@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import functools
 
-import numba
 import numpy as np
-from numba import types
 
 from aobake.tracing.compiled import callback
-from aobake.tracing.contacts import pointer_to
 from aobake.tracing.embree import HitFilter
+from aobake.tracing.foreign import array_at
 
 __all__ = ["pass_through_backfaces"]
 
 
 def _reject(arguments):
     """RTCFilterFunctionN: make hits invalid whose ray runs along the triangle's normal."""
-    fields = numba.carray(arguments, 6, np.int64)
-    count = np.int64(numba.carray(arguments, 12, np.int32)[10])
-    valid = numba.carray(pointer_to(fields[0]), count, np.int32)
-    ray = numba.carray(pointer_to(fields[3]), 12 * count, np.float32)
-    hit = numba.carray(pointer_to(fields[4]), 3 * count, np.float32)
+    fields = array_at(arguments, 6, np.int64)
+    count = np.int64(array_at(arguments, 12, np.int32)[10])
+    valid = array_at(fields[0], count, np.int32)
+    ray = array_at(fields[3], 12 * count, np.float32)
+    hit = array_at(fields[4], 3 * count, np.float32)
     for k in range(count):
         along = 0.0
         for i in range(3):
@@ -33,4 +31,4 @@ def _reject(arguments):
 @functools.cache
 def pass_through_backfaces() -> HitFilter:
     """What lets rays through from behind; compiled when it is first needed."""
-    return HitFilter(function=callback(types.void(types.voidptr), _reject), sided=True)
+    return HitFilter(function=callback(_reject), sided=True)

@@ -1,106 +1,162 @@
-"""How kernels are compiled: with numba, once per machine, without the interpreter lock.
+"""How kernels are compiled: with numba, once per machine, and called without it.
 
-The compiled code is kept in the user's cache folder (kept.py); where that cannot be written, kernels are
-compiled anew in each process. What made the first run of all short, in seconds of a vertex bake's 18:
+A kernel that is called for the first time is looked up in the user's cache folder (kept.py), by what it is made of
+and the kinds of its arguments. Only where it is not there, numba is imported and makes machine code (translate.py),
+which is loaded from memory as it is from disk (machine.py): a bake whose kernels are kept never imports numba.
 
-- no wrappers for Python and C around functions that only kernels call: 4;
-- arrays as arguments, where np.empty and np.zeros in a kernel bring numba's formatting of strings with
-  them for the errors that they could raise, and np.argsort its quicksort: 7.
-
-Tried and left: merging small functions before they are typed (numba's inline="always") took four times as
-long for place_origins, since each copy is typed and lowered again.
+What made compiling short, in seconds of a vertex bake's 24: no wrappers for Python and C around functions that only
+kernels call, 4; no np.zeros and np.argsort in kernels, 7; making code fast once (translate.hurry), 1. Tried and
+left: merging small functions before they are typed (numba's inline="always") took four times as long for
+place_origins, since each copy is typed and lowered again.
 """
 
 from __future__ import annotations
 
-import importlib
-import sys
-from collections.abc import Callable, Mapping
-from typing import Any, ParamSpec, TypeVar, cast
+import ctypes
+import functools
+import threading
+from collections.abc import Callable
+from typing import Any, Generic, ParamSpec, TypeVar
 
-import numba
 import numpy as np
-from numba.core.ccallback import CFunc
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from aobake.errors import EngineError
+from aobake.tracing import machine
+from aobake.tracing.arguments import slotted
 from aobake.tracing.kept import Kept
 
 __all__ = [
+    "Kernel",
     "aligned",
     "callback",
-    "import_without_blas",
+    "compile_alone",
     "inlined",
-    "is_kept",
     "kernel",
-    "read_only",
-    "routine",
-    "tight_kernel",
+    "operation",
 ]
-
-# numpy's error model drops the zero-division checks, which would keep loops from being vectorised.
-CALLED_BACK: Mapping[str, object] = {"error_model": "numpy"}
-COUNTED = {"error_model": "numpy", "nogil": True, "_nrt": True, "no_cfunc_wrapper": True}
-UNCOUNTED = COUNTED | {"_nrt": False}
-INLINED, ROUTINE = UNCOUNTED | {"no_cpython_wrapper": True}, COUNTED | {"no_cpython_wrapper": True}
 
 P = ParamSpec("P")
 R = TypeVar("R")
-ScalarT = TypeVar("ScalarT", bound=np.generic)
+Function = TypeVar("Function", bound=Callable[..., object])
+Result = type[ctypes.c_int64 | ctypes.c_uint64 | ctypes.c_double]
+Entry = tuple[Callable[..., int], Result | None]  # the C function, and what it gives
+
+_ENTRY = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p)
+RESULTS: dict[str, Result | None] = {
+    "none": None,
+    "int64": ctypes.c_int64,
+    "uint64": ctypes.c_uint64,
+    "float64": ctypes.c_double,
+}
+_COMPILING = (
+    threading.RLock()
+)  # callbacks are asked for while arguments of kernels are put together
+
+# What numba has not been told of. That takes 0.6 ms for each, and only compiling needs it.
+_FUNCTIONS: list[Callable[..., object]] = []
+_OPERATIONS: list[Callable[..., object]] = []
+_ALONE: list[bool] = []
 
 
-def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a function over arrays and numbers when it is first called; keep the code on disk."""
-    return _compiled(function, COUNTED)
+class Kernel(Generic[P, R]):
+    """A compiled function over arrays and numbers. It returns nothing or a number.
 
-
-def tight_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """A kernel that allocates nothing and counts no references.
-
-    Every view of an array is a counted reference else, and threads that share the array fight over
-    the counter: it made the placing of origins six times slower. Scratch memory is an argument.
+    The interpreter lock is let go of while it runs. It allocates nothing: scratch memory is an argument.
     """
-    return _compiled(function, UNCOUNTED)
+
+    def __init__(self, function: Callable[P, R]) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self._kept = Kept(function)
+        self._entries: dict[str, Entry] = {}
+
+    def __call__(self, *arguments: P.args, **named: P.kwargs) -> R:
+        if named:
+            raise TypeError(f"{self.py_func.__name__} takes its arguments by their places.")
+        kinds, slots = slotted(arguments)
+        entry, kind = self._entries.get(kinds) or self._compiled(kinds, arguments)
+        result = (kind or ctypes.c_int64)()
+        status = entry((ctypes.c_int64 * len(slots))(*slots), ctypes.byref(result))
+        if status != 0:
+            raise EngineError(f"kernel {self.py_func.__name__} ended with status {status}.")
+        return result.value if kind else None  # type: ignore[return-value]
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of arguments that it has been called with."""
+        return tuple(self._entries)
+
+    def is_kept(self) -> bool:
+        """Whether its code, as it is now, is on disk for arguments of some kinds."""
+        return self._kept.known()
+
+    def _compiled(self, kinds: str, arguments: tuple[object, ...]) -> Entry:
+        """The code for arguments of some kinds, from disk or from numba."""
+
+        def made() -> bytes:
+            _introduce()
+            from aobake.tracing import translate
+
+            code, result = translate.as_kernel(self.py_func, arguments)
+            if result not in RESULTS:
+                name = self.py_func.__name__
+                raise EngineError(f"kernel {name} returns {result}: fill an array instead.")
+            return bytes([list(RESULTS).index(result)]) + code
+
+        with _COMPILING:
+            if kinds not in self._entries:
+                code = self._kept.code(kinds, made)
+                result = list(RESULTS.values())[code[0]]
+                self._entries[kinds] = _ENTRY(machine.loaded(code[1:])), result
+            return self._entries[kinds]
 
 
-def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """A function that kernels call; LLVM merges it into them. Allocates nothing. From Python it is Python."""
-    _UNKNOWN.append((function, INLINED))
+def kernel(function: Callable[P, R]) -> Kernel[P, R]:
+    """Compile a function over arrays and numbers when it is first called; keep the code on disk."""
+    return Kernel(function)
+
+
+def inlined(function: Function) -> Function:
+    """A function that kernels call; LLVM merges it into them. From Python it is Python."""
+    _FUNCTIONS.append(function)
     return function
 
 
-def routine(function: Callable[P, R]) -> Callable[P, R]:
-    """A function that kernels call and that allocates. From Python it is Python."""
-    _UNKNOWN.append((function, ROUTINE))
-    return function
+def operation(definition: Callable[..., object]) -> Callable[..., Any]:
+    """An operation that kernels call and Python cannot, defined as numba.extending.intrinsic wants it."""
+    _OPERATIONS.append(definition)
+    return definition
 
 
-# Functions that numba has not been told of. That takes 0.6 ms for each, and only compiling needs it.
-_UNKNOWN: list[tuple[Callable[..., object], Mapping[str, object]]] = []
+def callback(function: Callable[..., object], *, returns: type[bool] | None = None) -> int:
+    """The address of a C function, made from one in Python that takes an address and gives nothing or a truth."""
+
+    def made() -> bytes:
+        _introduce()
+        from aobake.tracing import translate
+
+        return translate.as_callback(function, returns=returns)
+
+    with _COMPILING:
+        return machine.loaded(Kept(function).code(f"callback {returns}", made))
+
+
+def compile_alone() -> None:
+    """Say that nobody else uses numba in this process, so that it may be hurried (translate.py)."""
+    _ALONE.append(True)
 
 
 def _introduce() -> None:
-    """Tell numba of all functions that kernels may call."""
-    while _UNKNOWN:
-        function, options = _UNKNOWN.pop()
-        register_jitable(**options)(function)
+    """Import numba, and tell it of all functions that kernels may call."""
+    from aobake.tracing import translate
 
-
-def _compiled(function: Callable[P, R], options: Mapping[str, object]) -> Callable[P, R]:
-    compiler: Any = numba.njit(**options)  # type: ignore[call-overload]
-    compiled = compiler(function)
-    compiled._cache = _kept(function, options)  # noqa: SLF001 - numba has no public way
-    return cast("Callable[P, R]", compiled)
-
-
-def _kept(function: Callable[..., object], options: Mapping[str, object]) -> Kept:
-    return Kept(function, f"{options} {INLINED} {ROUTINE}", before_compiling=_introduce)
-
-
-def is_kept(kernel: Callable[P, R]) -> bool:
-    """Whether the code of a kernel, as it is now, is on disk for arguments of some types."""
-    compiled: Any = kernel
-    return bool(compiled._cache.known())  # noqa: SLF001 - as above
+    if _ALONE:
+        translate.hurry()
+    while _OPERATIONS:
+        translate.introduce_operation(_OPERATIONS.pop())
+    while _FUNCTIONS:
+        translate.introduce(_FUNCTIONS.pop())
 
 
 def aligned(count: int, dtype: type[np.generic]) -> NDArray[np.generic]:
@@ -109,41 +165,3 @@ def aligned(count: int, dtype: type[np.generic]) -> NDArray[np.generic]:
     memory = np.zeros(count * size + 64, np.uint8)
     first = -memory.ctypes.data % 64
     return memory[first : first + count * size].view(dtype)
-
-
-def import_without_blas() -> None:
-    """Import numba's array functions, which every kernel needs, but not scipy's linear algebra with them.
-
-    They ask for it when they are first imported, for np.dot, which no kernel of ours calls: 0.17 s. For
-    a process of our own only: in one that others share, their kernels may want np.dot.
-    """
-    blas = "scipy.linalg.cython_blas"
-    if blas not in sys.modules:
-        sys.modules[blas] = None  # type: ignore[assignment]  # Python's way to say: not there
-        try:
-            importlib.import_module("numba.np.arraymath")
-        finally:
-            del sys.modules[blas]
-
-
-def read_only(array: NDArray[ScalarT]) -> NDArray[ScalarT]:
-    """A read-only view, for kernels that only read: numba compiles anew for each mix of the two kinds."""
-    view = array.view()
-    view.flags.writeable = False
-    return view
-
-
-def callback(signature: Any, function: Callable[..., object]) -> int:
-    """The address of a C function made from a Python one. The code lives as long as the process.
-
-    signature : numba's, of the result called with the arguments
-    """
-    types = signature.args, signature.return_type
-    compiled: Any = CFunc(function, types, {}, dict(CALLED_BACK))
-    compiled._cache = _kept(function, CALLED_BACK)  # noqa: SLF001 - as above
-    compiled.compile()
-    _ALIVE.append(compiled)
-    return int(compiled.address)
-
-
-_ALIVE: list[object] = []  # a cfunc that is collected takes its machine code with it

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.tracing.compiled import read_only, tight_kernel
+from aobake.tracing.compiled import kernel
 from aobake.tracing.rows import bounds, largest_in_rows
 from aobake.tracing.vectors import length, minus, row
 
@@ -90,11 +90,11 @@ def detail_at_vertices(vertices: FloatArray, faces: FaceArray) -> FloatArray:
     Not the shortest edge: a sliver is not detail, and scans are full of slivers.
     """
     detail = np.full(len(vertices), np.inf)
-    _refine(read_only(faces), _longest_edges(vertices, faces), detail)
+    _refine(faces, _longest_edges(vertices, faces), detail)
     return detail
 
 
-@tight_kernel
+@kernel
 def _refine(faces, longest, detail):
     """Lower detail (V,) to the size of the smallest face at each vertex."""
     for f in range(len(faces)):
@@ -204,11 +204,11 @@ def split_long_edges(
 def _longest_edges(vertices: FloatArray, faces: FaceArray) -> FloatArray:
     """(F,) length of the longest edge of each face."""
     longest = np.zeros(len(faces))
-    lengthen(read_only(vertices), read_only(faces), longest)
+    lengthen(vertices, faces, longest)
     return longest
 
 
-@tight_kernel
+@kernel
 def lengthen(vertices, faces, longest):
     """Raise longest (F,) to the length of the longest edge of each face."""
     for f in range(len(faces)):

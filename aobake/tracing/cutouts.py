@@ -12,14 +12,12 @@ import functools
 from dataclasses import dataclass
 from typing import Literal
 
-import numba
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from aobake.tracing.compiled import callback, inlined
-from aobake.tracing.contacts import pointer_to
 from aobake.tracing.embree import HitFilter
+from aobake.tracing.foreign import array_at
 from aobake.tracing.kernels import DIRECTION, ORIGIN, RAY_NUMBER
 
 __all__ = ["CUTOFF_SLACK", "CutOut", "Edge", "pass_through_holes"]
@@ -101,7 +99,7 @@ def _bounds(cutout: CutOut) -> NDArray[np.uint8]:
 
 @functools.cache
 def _function() -> int:
-    return callback(types.void(types.voidptr), _decide)
+    return callback(_decide)
 
 
 @inlined
@@ -230,19 +228,19 @@ def drawn(rays, hits, count, k):
 
 def _decide(arguments):
     """RTCFilterFunctionN: make hits invalid where the triangle has a hole, or lets some of the ray through."""
-    fields = numba.carray(arguments, 6, np.int64)
-    count = np.int64(numba.carray(arguments, 12, np.int32)[10])
-    valid = numba.carray(pointer_to(fields[0]), count, np.int32)
-    data = numba.carray(pointer_to(fields[1]), WORDS, np.int64)
-    cutoff = numba.carray(pointer_to(fields[1]), WORDS, np.float64)[CUTOFF]
-    ray = numba.carray(pointer_to(fields[3]), RAY_ROWS * count, np.float32)
-    rays = numba.carray(pointer_to(fields[3]), RAY_ROWS * count, np.uint32)
-    hit = numba.carray(pointer_to(fields[4]), HIT_ROWS * count, np.float32)
-    hits = numba.carray(pointer_to(fields[4]), HIT_ROWS * count, np.uint32)
-    corners = numba.carray(pointer_to(data[CORNERS]), CORNER_NUMBERS * data[FACES], np.float32)
-    alpha = numba.carray(pointer_to(data[ALPHA]), data[WIDTH] * data[HEIGHT], np.uint8)
+    fields = array_at(arguments, 6, np.int64)
+    count = np.int64(array_at(arguments, 12, np.int32)[10])
+    valid = array_at(fields[0], count, np.int32)
+    data = array_at(fields[1], WORDS, np.int64)
+    cutoff = array_at(fields[1], WORDS, np.float64)[CUTOFF]
+    ray = array_at(fields[3], RAY_ROWS * count, np.float32)
+    rays = array_at(fields[3], RAY_ROWS * count, np.uint32)
+    hit = array_at(fields[4], HIT_ROWS * count, np.float32)
+    hits = array_at(fields[4], HIT_ROWS * count, np.uint32)
+    corners = array_at(data[CORNERS], CORNER_NUMBERS * data[FACES], np.float32)
+    alpha = array_at(data[ALPHA], data[WIDTH] * data[HEIGHT], np.uint8)
     blocks = data[BLOCKS] * ((data[HEIGHT] + BLOCK - 1) // BLOCK)
-    bounds = numba.carray(pointer_to(data[BOUNDS]), 2 * blocks, np.uint8)
+    bounds = array_at(data[BOUNDS], 2 * blocks, np.uint8)
     for k in range(count):
         if valid[k] != -1:
             continue

@@ -24,14 +24,25 @@ from numpy.typing import NDArray
 
 from aobake.errors import EngineError
 
-__all__ = ["Body", "Functions", "HitFilter", "Tree", "build_tree", "functions", "version"]
+__all__ = [
+    "Body",
+    "Functions",
+    "HitFilter",
+    "Tree",
+    "build_tree",
+    "functions",
+    "packets",
+    "version",
+]
 
 FORMAT_UINT3, FORMAT_FLOAT3, FORMAT_FLOAT3X4_COLUMN_MAJOR = 0x5003, 0x9003, 0x9234
 BUFFER_INDEX, BUFFER_VERTEX = 0, 1
 GEOMETRY_TRIANGLE, GEOMETRY_INSTANCE = 0, 121
 SCENE_ROBUST = 4
 QUALITY_MEDIUM = 1
-PROPERTY_VERSION = 0
+PROPERTY_VERSION, PROPERTY_NATIVE_RAY16 = 0, 34
+INCOHERENT, COHERENT = 0, 1 << 16
+ALL_FEATURES = -1
 VERTEX_BYTES, FACE_BYTES = 12, 12
 READ_AHEAD_BYTES = 16  # Embree loads a vertex with one 16-byte read, also the last one of a buffer
 
@@ -70,6 +81,8 @@ class Functions:
 
     occluded8: int
     intersect8: int
+    occluded16: int
+    intersect16: int
     point_query: int
 
 
@@ -162,7 +175,40 @@ def functions() -> Functions:
     def address(name: str) -> int:
         return ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value or 0
 
-    return Functions(address("rtcOccluded8"), address("rtcIntersect8"), address("rtcPointQuery"))
+    return Functions(
+        occluded8=address("rtcOccluded8"),
+        intersect8=address("rtcIntersect8"),
+        occluded16=address("rtcOccluded16"),
+        intersect16=address("rtcIntersect16"),
+        point_query=address("rtcPointQuery"),
+    )
+
+
+@functools.cache
+def packets(*, coherent: bool = False, lanes: int | None = None) -> tuple[int, int, int, int]:
+    """How kernels ask for packets: rtcOccludedN and rtcIntersectN, N, and the address of their arguments.
+
+    coherent : whether rays of a packet meet much the same boxes on their way, so that Embree follows them together
+    lanes : 8 or 16; None: 16 where the processor has instructions for as many, since Embree takes others one by one
+    """
+    if lanes is None:
+        lanes = 16 if _library().rtcGetDeviceProperty(_device(), PROPERTY_NATIVE_RAY16) else 8
+    found, asked = functions(), _arguments(COHERENT if coherent else INCOHERENT)
+    if lanes == 16:
+        return found.occluded16, found.intersect16, lanes, asked
+    return found.occluded8, found.intersect8, lanes, asked
+
+
+@functools.cache
+def _kept_arguments(flags: int) -> NDArray[np.int32]:
+    """RTCOccludedArguments, which begin as RTCIntersectArguments do: flags, features, and nothing else."""
+    asked = np.zeros(16, np.int32)
+    asked[:2] = flags, ALL_FEATURES
+    return asked
+
+
+def _arguments(flags: int) -> int:
+    return int(_kept_arguments(flags).ctypes.data)
 
 
 def _new_scene() -> int:

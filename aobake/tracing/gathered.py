@@ -15,7 +15,7 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Gathered:
-    """Sums over the rays of P points; None where nobody asked for them.
+    """Sums over the rays of P points, those of one set weighed alike; None where nobody asked for them.
 
     directions : (P, 3) float64, of the directions of rays, each as much as it is open
     distances : (P,) float64, of how far rays got, none farther than `reach`, in units of the tree
@@ -39,12 +39,12 @@ class Gathered:
         reach = None if self.distances is None else self.reach
         return Gathered.blank(count, bent=self.directions is not None, reach=reach)
 
-    def add(self, chosen: IntArray, part: Gathered) -> None:
-        """Add what further rays of the chosen points told."""
+    def add(self, chosen: IntArray, part: Gathered, weights: FloatArray) -> None:
+        """Add what a further set of each of the chosen points told. weights : (len(chosen),) of each ray of it"""
         if self.directions is not None and part.directions is not None:
-            self.directions[chosen] += part.directions
+            self.directions[chosen] += weights[:, None] * part.directions
         if self.distances is not None and part.distances is not None:
-            self.distances[chosen] += part.distances
+            self.distances[chosen] += weights * part.distances
 
     def for_kernel(self) -> tuple[FloatArray | None, tuple[float, FloatArray] | None]:
         """The last two arguments of kernels.trace."""
@@ -65,11 +65,11 @@ class Gathered:
         mean = self.directions / np.where(told, length, 1.0)
         return np.where(told, mean, normals).astype(np.float32)
 
-    def mean_distance(self, rays: IntArray) -> FloatArray | None:
+    def mean_distance(self, weights: FloatArray) -> FloatArray | None:
         """(P,) how far one sees in the mean, in units of the tree; as far as counts where there was no ray.
 
-        rays : (P,) how many were added up
+        weights : (P,) of all rays that were added up
         """
         if self.distances is None:
             return None
-        return np.where(rays > 0, self.distances / np.maximum(rays, 1), self.reach)
+        return np.where(weights > 0, self.distances / np.maximum(weights, 1.0), self.reach)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aobake.tracing.compiled import inlined, tight_kernel
+from aobake.tracing.compiled import inlined, kernel
 from aobake.tracing.vectors import cross, dot, largest, length, minus, row, scaled
 
 __all__ = ["interpolate"]
@@ -45,7 +45,7 @@ def put(array, i, a):
     array[i, 0], array[i, 1], array[i, 2] = a[0], a[1], a[2]
 
 
-@tight_kernel
+@kernel
 def interpolate(mesh, placings, rows, instances, chosen, weights, out):
     """Fill rows of points that lie on the faces of one mesh, wherever it stands.
 

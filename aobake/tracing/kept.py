@@ -1,8 +1,8 @@
 """Compiled kernels on disk, found again by what they were compiled from.
 
 A kernel's file is named after a digest of all that its machine code depends on (content.py), the types of its
-arguments, the processor, and the versions of the compiler. So no code is ever stale; code is found again
-after a new installation, a moved folder, or an upgrade that left the kernel alone; and processes that write
+arguments, the processor, the versions of the compiler, and how it is used. So no code is ever stale; code is
+found again after a new installation, a moved folder, or an upgrade that left the kernel alone; and processes that write
 a file at the same moment write the same one.
 
 numba's own cache lies beside the source and goes with it, takes a function for unchanged when only another
@@ -15,29 +15,27 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import importlib.metadata
 import importlib.util
 import os
-import pickle
+import pkgutil
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
-
-import llvmlite
-import numba
-from numba.core import compiler, serialize
 
 from aobake.errors import OutputError
 from aobake.files import write_files
 from aobake.tracing import claims
-from aobake.tracing.claims import Claim, claimed
+from aobake.tracing.claims import claimed
 from aobake.tracing.content import content
 
 __all__ = ["FOLDER_VARIABLE", "Kept", "folder", "problem"]
 
 FOLDER_VARIABLE = "AOBAKE_CACHE_DIR"
 ENDING = ".kernel"
+MAKING = ("arguments.py", "translate.py", "machine.py")  # beside a kernel's own source
+DIGEST_BYTES = 32
 MOST_BYTES = 64 << 20  # of all files: some 500 kernels; a bake of every kind needs about 60
 DAY_S = 86400.0
 UNFINISHED = (".part", claims.ENDING)
@@ -74,103 +72,91 @@ def problem() -> str | None:
 
 
 class Kept:
-    """The compiled forms of one kernel: what numba asks of a cache.
+    """The compiled forms of one kernel.
 
     Whatever goes wrong here costs a compilation, never a bake.
     """
 
-    def __init__(
-        self,
-        function: Callable[..., object],
-        options: str,
-        *,
-        before_compiling: Callable[[], None] = lambda: None,
-    ) -> None:
-        """options : what else the code depends on; before_compiling : called where it is not on disk."""
-        self._function, self._options = function, options
-        self._before_compiling = before_compiling
-        self._claims: dict[Path, Claim] = {}
-
-    @property
-    def cache_path(self) -> str | None:
-        """The folder, for numba's statistics."""
-        place = folder()
-        return None if place is None else str(place)
+    def __init__(self, function: Callable[..., object]) -> None:
+        self._function = function
 
     def known(self) -> bool:
-        """Whether the kernel, as it is now, is kept for arguments of some types."""
+        """Whether the kernel, as it is now, is kept for arguments of some kinds."""
         place = folder()
         return place is not None and next(place.glob(f"{self._stem()}-*{ENDING}"), None) is not None
 
-    def load_overload(self, signature: object, target: Any) -> Any:
-        """The compiled form for a signature; None where it has to be compiled, by this process.
+    def code(self, kinds: str, made: Callable[[], bytes]) -> bytes:
+        """The code for arguments of some kinds: from disk, else as it is made now, and kept.
 
-        While another one compiles it, waits for that.
+        While another process makes it, waits for that.
         """
-        target.refresh()
-        path = self._path(signature, target)
-        found = None if path is None else self._found(path, target)
-        if found is None:
-            self._before_compiling()
-        return found
-
-    def _found(self, path: Path, target: Any) -> Any:
-        """What is in a file, now or when another process has made it; else None, and the claim to make it."""
-        found = _read(path, target)
-        if found is None:
-            claim = claimed(path)
-            found = _read(path, target)
-            if found is None:
-                self._claims[path] = claim
-            else:
-                claim.give_back()
-        return found
-
-    def save_overload(self, signature: object, result: Any) -> None:
-        """Keep what was compiled for a signature; where that fails, say so in problem()."""
-        path = self._path(signature, result.target_context)
+        path = self._path(kinds)
         if path is None:
             _note("", "this user has no home")
-            return
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_files({path: serialize.dumps(result._reduce())})  # noqa: SLF001
-            _make_room(path.parent)
-        except (OSError, OutputError) as error:
-            # On Windows a file cannot be replaced that another process made meanwhile, and has open.
-            if not path.exists():
-                reason = getattr(error.__cause__ or error, "strerror", None)
-                _note(f" in {path.parent}", reason or "no permission")
-        if path in self._claims:
-            self._claims.pop(path).give_back()
+            return made()
+        found = _read(path)
+        if found is None:
+            claim = claimed(path)
+            try:
+                found = _read(path)
+                if found is None:
+                    found = made()
+                    _write(path, found)
+            finally:
+                claim.give_back()
+        return found
 
     def _stem(self) -> str:
         return f"{self._function.__name__}-{content(self._function)[:16]}"
 
-    def _path(self, signature: object, target: Any) -> Path | None:
-        """The file for a signature; None where there is no place for any."""
+    def _path(self, kinds: str) -> Path | None:
+        """The file for arguments of some kinds; None where there is no place for any."""
         place = folder()
-        told = (content(self._function), self._options, repr(signature), _compiler(target))
+        told = (content(self._function), kinds, _compiler())
         rest = hashlib.sha256("\n".join(told).encode()).hexdigest()[:32]
         return None if place is None else place / f"{self._stem()}-{rest}{ENDING}"
 
 
-def _read(path: Path, target: Any) -> Any:
-    """What was compiled; None where it is not there, cut short, or of another format."""
+def _read(path: Path) -> bytes | None:
+    """What was compiled; None where it is not there, or damaged."""
     try:
-        payload = pickle.loads(path.read_bytes())  # noqa: S301 - of the user's own folder
-        loaded = compiler.CompileResult._rebuild(target, *payload)  # noqa: SLF001
-    except Exception:  # noqa: BLE001 - whatever it is: compiled anew
+        whole = path.read_bytes()
+    except OSError:
+        return None
+    digest, code = whole[:DIGEST_BYTES], whole[DIGEST_BYTES:]
+    if digest != hashlib.sha256(code).digest():
         return None
     _mark_used(path)
-    return loaded
+    return code
+
+
+def _write(path: Path, code: bytes) -> None:
+    """Keep what was compiled; where that fails, say so in problem()."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_files({path: hashlib.sha256(code).digest() + code})
+        _make_room(path.parent)
+    except (OSError, OutputError) as error:
+        # On Windows a file cannot be replaced that another process made meanwhile, and has open.
+        if not path.exists():
+            reason = getattr(error.__cause__ or error, "strerror", None)
+            _note(f" in {path.parent}", reason or "no permission")
 
 
 @functools.cache
-def _compiler(target: Any) -> str:
-    """What the same source may be compiled differently by: versions, the processor."""
+def _compiler() -> str:
+    """What the same source may be compiled differently by: versions, the processor, how numba is used."""
+    from aobake.tracing import machine
+
     python = importlib.util.MAGIC_NUMBER.hex()
-    return repr((numba.__version__, llvmlite.__version__, python, target.codegen().magic_tuple()))
+    numba = importlib.metadata.version("numba")
+    chosen = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_"))
+    ours = (pkgutil.get_data(__package__, name) or b"" for name in MAKING)
+    return repr((numba, python, machine.processor(), chosen, *map(_digest, ours)))
+
+
+def _digest(text: bytes) -> str:
+    return hashlib.sha256(text).hexdigest()
 
 
 def _mark_used(path: Path) -> None:

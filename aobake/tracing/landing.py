@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.tracing.compiled import inlined, tight_kernel
+from aobake.tracing.compiled import inlined, kernel
 from aobake.tracing.vectors import cross, dot, largest, length, minus, row
 
 __all__ = ["land", "scratch"]
@@ -42,7 +42,7 @@ def scratch() -> NDArray[np.float64]:
     return np.zeros((6, 3))
 
 
-@tight_kernel
+@kernel
 def land(bodies, things, hits, directions, scratch, normal, origin, front):
     """Fill in, for each hit, the normal that is seen, where rays to lights start, and whether it is a front.
 

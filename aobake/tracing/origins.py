@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aobake.tracing.compiled import inlined, tight_kernel
+from aobake.tracing.compiled import inlined, kernel
 from aobake.tracing.contacts import MOST_TOUCHING, ULP, new_touching, query_buffers, touching
 from aobake.tracing.vectors import cross, dot, length, minus, row
 
@@ -241,7 +241,7 @@ def scratch() -> tuple[object, ...]:
     return query_buffers(), new_touching(), np.zeros(MOST_TOUCHING, np.int64)
 
 
-@tight_kernel
+@kernel
 def place_origins(  # noqa: C901 - one point from lookup to origin
     functions, scene, world, positions, normals, scratch, origins, states
 ):

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.tracing import embree
-from aobake.tracing.compiled import aligned, read_only, tight_kernel
+from aobake.tracing.compiled import aligned, kernel
+from aobake.tracing.foreign import call_packet
 from aobake.tracing.kernels import (
     DIRECTION,
     FAR,
@@ -20,7 +21,6 @@ from aobake.tracing.kernels import (
     NEAR,
     ORIGIN,
     RAY_HIT_FLOATS,
-    call_packet,
     ready,
 )
 
@@ -94,11 +94,11 @@ def _cast(
 ) -> None:
     packet = aligned(RAY_HIT_FLOATS, np.float32)
     scratch = packet, packet.view(np.int32), aligned(8, np.int32)
-    given = tuple(read_only(np.ascontiguousarray(array, np.float32)) for array in rays)
+    given = tuple(np.ascontiguousarray(array, np.float32) for array in rays)
     cast(function, tree.address, given, scratch, out)
 
 
-@tight_kernel
+@kernel
 def cast(function, scene, rays, scratch, out):
     """Send rays through Embree in packets of eight neighbours.
 
@@ -112,7 +112,7 @@ def cast(function, scene, rays, scratch, out):
     origins, directions, near = rays
     packet, words, valid = scratch
     distance, thing, face, weights = out
-    ready(packet, words)
+    ready(packet, words, 8, 0)
     for first in range(0, len(near), 8):
         count = min(8, len(near) - first)
         for k in range(8):
@@ -125,7 +125,7 @@ def cast(function, scene, rays, scratch, out):
             packet[8 * FAR + k] = distance[ray]
             words[8 * GEOMETRY_ID + k] = -1
             words[8 * INSTANCE_ID + k] = -1
-        call_packet(function, valid.ctypes.data, scene, packet.ctypes.data)
+        call_packet(function, valid.ctypes.data, scene, packet.ctypes.data, 0)
         for k in range(count):
             ray = first + k
             distance[ray] = packet[8 * FAR + k]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.tracing.compiled import tight_kernel
+from aobake.tracing.compiled import kernel
 from aobake.tracing.vectors import dot, row
 
 __all__ = ["MARGIN", "Hull", "hull_of", "open_sky"]
@@ -77,7 +77,7 @@ def open_sky(
     return found
 
 
-@tight_kernel
+@kernel
 def _mark_open(positions, normals, corners, starts, neighbours, margin, found):
     summit = 0
     for p in range(len(positions)):

@@ -70,11 +70,15 @@ class World:
     arrays : what origins.py looks triangles up in: vertices (N, 3) float32, faces (M, 3) uint32, first
         vertex and first face of each body, number of bodies that stand where they are, body of each
         instance behind those, transforms (3 I, 4) float64 and slack (I,) of each instance
+    triangles : those of all instances
+    filtered : whether there are surfaces of which some hits do not count, or count in part
     """
 
     tree: embree.Tree
     frame: UnitFrame
     arrays: WorldArrays
+    triangles: int
+    filtered: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +117,9 @@ def build_world(
         part = parts[number]
         bodies.append(_Body(frames[number].apply(part.vertices), part.faces, part.hit_filter))
     arrays = _pool(bodies, len(bodies) - len(kept), *_instances(moving, kept, frames, frame))
-    return World(_tree(bodies, arrays), frame, arrays)
+    triangles = sum(len(parts[p.part].faces) for p in placements)
+    filtered = any(body.hit_filter is not None for body in bodies)
+    return World(_tree(bodies, arrays), frame, arrays, triangles, filtered)
 
 
 def _can_be_instanced(transform: FloatArray, hit_filter: HitFilter | None) -> bool:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aobake.tracing import embree, kernels
+from aobake.tracing import embree
 from aobake.tracing.compiled import aligned, kernel
 from aobake.tracing.contacts import note_triangle
+from aobake.tracing.foreign import call_packet
 from aobake.tracing.origins import place_origins, scratch
 from aobake.tracing.sampling import direction_sets
 from aobake.tracing.world import Placement, Triangles, World, build_world
@@ -19,8 +19,6 @@ from tests import scenes
 from tests.scenes import FloatArray
 
 BITS = 2**64 - 1
-
-call_packet: Callable[..., None] = kernels.call_packet
 
 
 def mixed_bits(seed: int, index: int) -> int:
@@ -104,7 +102,7 @@ def _ask_packets(function, scene, packet, masks, origins, directions, hits):  # 
             packet[24 + k], packet[56 + k], packet[64 + k] = 0.0, 0.0, np.inf
             words[72 + k], words[80 + k], words[88 + k] = -1, 0, 0
             masks[k] = -1
-        call_packet(function, masks.ctypes.data, scene, packet.ctypes.data)
+        call_packet(function, masks.ctypes.data, scene, packet.ctypes.data, 0)
         for k in range(min(8, len(origins) - first)):
             hits[first + k] = packet[64 + k] < 0.0
 

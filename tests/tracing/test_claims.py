@@ -5,9 +5,6 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
-import pytest
-
-from aobake.tracing import ahead
 from aobake.tracing.claims import claimed
 from tests.support import python
 
@@ -53,13 +50,3 @@ def test_patience_ends_with_a_claim_in_name_only(tmp_path: Path) -> None:
 def test_where_nothing_can_be_locked_everybody_goes_on(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     claimed(tmp_path / "file" / "made").give_back()
-
-
-def test_nothing_is_compiled_ahead_that_is_kept_or_that_has_no_processor(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    ahead.compile_origins()
-    assert not ahead.compile_ahead()
-    monkeypatch.setattr(ahead, "is_kept", lambda _: False)
-    monkeypatch.setattr(ahead, "processors", lambda: 1)
-    assert not ahead.compile_ahead()

@@ -18,7 +18,7 @@ from aobake.tracing.cutouts import CutOut, pass_through_holes
 from aobake.tracing.world import Placement, Triangles, build_world
 from tests.cards import UNIT, hole, image_of, overhead, scene_of, sheet
 from tests.known import disc_factor, plane_with_falloff, rectangle_factor
-from tests.scenes import TURNED, UP, FloatArray, floor, patch
+from tests.scenes import TURNED, UP, FloatArray, affine, floor, patch
 from tests.tracing.rays import occluded
 
 AT_ORIGIN = np.zeros((16, 3)), np.tile(UP, (16, 1))
@@ -172,10 +172,8 @@ def test_instances_see_their_own_holes() -> None:
     mesh, material = sheet(1.0, 0.0), overhead(hole(64, 0.7)).materials[0]
     transforms = []
     for k in range(6):
-        transform = np.eye(4)
-        transform[:3, :3] = TURNED if k % 2 else np.diag([1.0, -1.0 if k % 3 else 1.0, 1.0])
-        transform[:3, 3] = (k % 3 - 1.0, k // 3 - 0.5, 0.5 + 0.2 * k)
-        transforms.append(transform)
+        linear = TURNED if k % 2 else np.diag([1.0, -1.0 if k % 3 else 1.0, 1.0])
+        transforms.append(affine(linear, (k % 3 - 1.0, k // 3 - 0.5, 0.5 + 0.2 * k)))
     image = (image_of(hole(64, 0.7)),)
     placed = scene_of([mesh], [material], image, transforms)
     alone = Scene(

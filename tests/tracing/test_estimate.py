@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from aobake import BakedVertices, BakeSettings, Scene, bake_vertices, visibility
-from aobake.tracing import estimate as estimating
+from aobake.tracing import blocks
 from aobake.tracing.rounds import equal_fixed_rays
 from tests.known import known_scenes
 from tests.scenes import TURNED, UP, Triangles, box, floor, icosphere, joined, moved
@@ -53,7 +53,7 @@ def test_threads_and_blocks_do_not_change_a_byte(
         return BakeSettings(rays=48, threads=threads, max_rays=512, **asked)
 
     reference = content(bake_vertices(scene, settings(1)))
-    monkeypatch.setattr(estimating, "BLOCK_RAYS", block_rays)
+    monkeypatch.setattr(blocks, "BLOCK_RAYS", block_rays)
     for threads in (1, 2, 5):
         assert content(bake_vertices(scene, settings(threads))) == reference
 
@@ -61,7 +61,7 @@ def test_threads_and_blocks_do_not_change_a_byte(
 def test_progress_does_not_change_a_byte_and_ends_at_the_whole(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(estimating, "BLOCK_RAYS", 1 << 12)
+    monkeypatch.setattr(blocks, "BLOCK_RAYS", 1 << 12)
     scene, settings = still_life(), BakeSettings(rays=64, threads=2)
     seen: list[tuple[str, int, int]] = []
     watched = bake_vertices(scene, settings, progress=lambda *state: seen.append(state))
@@ -128,11 +128,11 @@ def test_no_point_gets_more_rays_than_the_most(most: int) -> None:
         scene, points, np.tile(UP, (50, 1)), BakeSettings(tolerance=1e-5, max_rays=most)
     )
     assert int(estimate.rays.max()) <= most
-    assert int(estimate.rays.min()) > 0.5 * most  # sets double
+    assert int(estimate.rays.min()) > 0.8 * most  # sets have whole packets
 
 
 def test_rounds_are_unbiased() -> None:
-    """Whether a set grows depends on its values, but they all count alike."""
+    """How large sets are depends on values, but not how they count."""
     known = 0.5  # a wall that hides one half of the sky
     wall = Triangles(
         np.array([(0.0, -1e4, 0.0), (0.0, 1e4, 0.0), (0.0, 0.0, 1e5)]),

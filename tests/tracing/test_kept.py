@@ -13,8 +13,8 @@ import pytest
 
 from aobake import environment
 from aobake.tracing import kept
-from aobake.tracing.compiled import is_kept, tight_kernel
-from tests.support import ROOT
+from aobake.tracing.compiled import Kernel, kernel
+from tests.support import ROOT, modules_after
 
 KERNEL = r"""
 import sys
@@ -30,8 +30,8 @@ assert toy.total(np.arange(4.0)) == 6.0
 print(len(compiled))
 """
 TOTAL = """
-from aobake.tracing.compiled import inlined, tight_kernel
-@tight_kernel
+from aobake.tracing.compiled import inlined, kernel
+@kernel
 def total(values):
     result = 0.0
     for value in values:
@@ -51,14 +51,14 @@ class Listener(event.Listener):
 event.register("numba:compile", Listener())
 import aobake
 from aobake.tracing.kept import Kept
-asked, load = [], Kept.load_overload
-Kept.load_overload = lambda self, *given: (asked.append(self), load(self, *given))[1]
+asked, code = [], Kept.code
+Kept.code = lambda self, *given: (asked.append(self), code(self, *given))[1]
 scene = aobake.Scene.from_arrays([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
 aobake.bake_vertices(scene, aobake.BakeSettings(rays=4))
-from aobake.tracing import ahead
+from aobake import ahead
 needed = len(asked)
 ahead.compile_origins()
-print(len(compiled), needed, len(ahead.place_origins.signatures), aobake.__file__, sep="\n")
+print(len(compiled), needed, len(ahead.place_origins.kinds), aobake.__file__, sep="\n")
 """
 
 
@@ -110,19 +110,31 @@ def test_a_smallest_bake_needs_few_kernels_and_another_installation_compiles_non
     assert kinds_of_origins == "1", "what is compiled ahead is what a bake asks for"
 
 
+def test_a_bake_whose_kernels_are_kept_imports_no_numba() -> None:
+    bake = [
+        "import aobake",
+        "scene = aobake.Scene.from_arrays([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])",
+        "aobake.bake_vertices(scene, aobake.BakeSettings(rays=4))",
+    ]
+    modules_after(bake)  # which may be the first that ever ran here
+    loaded = modules_after(bake)
+    assert "llvmlite" in loaded
+    assert "numba" not in loaded
+
+
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv(kept.FOLDER_VARIABLE, str(tmp_path / "kept"))
     return tmp_path / "kept"
 
 
-def fresh() -> object:
+def fresh() -> Kernel[[object], int]:
     """A kernel that this process has not compiled."""
 
     def doubled(value):  # type: ignore[no-untyped-def]
         return 2 * value
 
-    return tight_kernel(doubled)
+    return kernel(doubled)
 
 
 def test_a_folder_that_cannot_be_written_costs_a_line_and_no_result(
@@ -133,8 +145,7 @@ def test_a_folder_that_cannot_be_written_costs_a_line_and_no_result(
     monkeypatch.setenv(kept.FOLDER_VARIABLE, str(place))
     monkeypatch.setattr(kept, "_PROBLEMS", [])
     for _ in range(2):
-        kernel = fresh()
-        assert kernel(4) == 8  # type: ignore[operator]
+        assert fresh()(4) == 8
     (line,) = environment.cache_warnings()
     assert str(place) in line
     assert kept.FOLDER_VARIABLE in line
@@ -144,21 +155,21 @@ def test_a_folder_that_cannot_be_written_costs_a_line_and_no_result(
 @pytest.mark.parametrize("content", [b"", b"not a kernel", None])
 def test_a_file_that_cannot_be_read_is_made_again(cache: Path, content: bytes | None) -> None:
     first = fresh()
-    assert first(21) == 42  # type: ignore[operator]
+    assert first(21) == 42
     (file,) = cache.iterdir()
     whole = file.read_bytes()
     file.write_bytes(whole[: len(whole) // 2] if content is None else content)
     again = fresh()
-    assert again(21) == 42  # type: ignore[operator]
+    assert again(21) == 42
     assert len(file.read_bytes()) == len(whole)
     assert [path.name for path in cache.iterdir()] == [file.name]
 
 
 def test_a_kernel_is_known_once_it_is_kept(cache: Path) -> None:
-    kernel = fresh()
-    assert not is_kept(kernel)  # type: ignore[arg-type]
-    assert kernel(np.int64(1)) == 2  # type: ignore[operator]
-    assert is_kept(kernel)  # type: ignore[arg-type]
+    doubling = fresh()
+    assert not doubling.is_kept()
+    assert doubling(np.int64(1)) == 2
+    assert doubling.is_kept()
 
 
 def test_what_was_not_used_for_the_longest_time_makes_room(
@@ -209,6 +220,5 @@ def test_a_user_without_a_home_keeps_nothing(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(Path, "home", homeless)
     monkeypatch.setattr(kept, "_PROBLEMS", [])
     assert kept.folder() is None
-    kernel = fresh()
-    assert kernel(3) == 6  # type: ignore[operator]
+    assert fresh()(3) == 6
     assert "no home" in str(kept.problem())

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
+from numpy.typing import NDArray
 
 from aobake import BakeSettings, Scene, visibility
 from aobake.tracing import embree
-from aobake.tracing.compiled import tight_kernel
-from aobake.tracing.kernels import SUMS, mix, scratch, trace, turned_frame
+from aobake.tracing.compiled import kernel
+from aobake.tracing.kernels import LINEAR, SUMS, mix, scratch, trace, turned_frame
 from aobake.tracing.sampling import direction_sets
-from tests.scenes import Triangles, box, icosphere, joined, moved, patch, rotation, unit
+from tests.scenes import FloatArray, Triangles, box, icosphere, joined, moved, patch, rotation, unit
 from tests.tracing.rays import (
     brute_force,
     directions_of,
@@ -22,6 +23,8 @@ from tests.tracing.rays import (
     sums_of,
     world_of,
 )
+
+SLANTED = np.tile(np.array([0.2, 0.1, 1.0], np.float32), (200, 1))
 
 
 def clutter(seed: int, faces: int = 60) -> Triangles:
@@ -114,41 +117,85 @@ def test_the_kernel_counts_what_the_scene_class_of_embreex_counts() -> None:
     assert differences.max() <= 2
 
 
+def sums_of_kernel(
+    functions: tuple[int, int, int, int],
+    rays: int,
+    *,
+    ground: bool = False,
+    geometric: NDArray[np.float32] | None = None,
+    falloff: int | None = None,
+) -> FloatArray:
+    """What the kernel adds up for 200 points among clutter, asked in packets of one kind or another."""
+    world, rng = world_of(clutter(4, 300)), np.random.default_rng(8)
+    origins = rng.uniform(-0.5, 0.5, (200, 3)).astype(np.float32)
+    normals = rng.standard_normal((200, 3)).astype(np.float32)
+    heights = origins[:, 2] + np.float32(0.6)
+    sums = np.empty((200, SUMS))
+    trace(
+        functions,
+        world.tree.address,
+        origins,
+        normals,
+        geometric,
+        np.arange(200),
+        np.uint64(0),
+        direction_sets(rays),
+        rays,
+        np.float32(np.inf if falloff is None else 0.7),
+        (2, heights) if ground else None,
+        falloff,
+        scratch(),
+        sums,
+        None,
+        None,
+    )
+    return sums
+
+
 @pytest.mark.parametrize("rays", [5, 64, 100])
 def test_the_kernel_adds_up_what_its_rays_tell(rays: int) -> None:
     """As many rays one by one; only those at edges may differ, which changes sums of few points."""
     world, rng = world_of(clutter(4, 300)), np.random.default_rng(8)
     origins = rng.uniform(-0.5, 0.5, (200, 3)).astype(np.float32)
     normals = rng.standard_normal((200, 3)).astype(np.float32)
-    functions, sums = embree.functions(), np.empty((200, SUMS))
-    trace(
-        (functions.occluded8, functions.intersect8),
-        world.tree.address,
-        origins,
-        normals,
-        None,
-        np.arange(200),
-        np.uint64(0),
-        direction_sets(rays),
-        rays,
-        np.float32(np.inf),
-        None,
-        None,
-        scratch(),
-        sums,
-        None,
-        None,
-    )
     around = [directions_of(0, number, normal, rays) for number, normal in enumerate(normals)]
     directions = np.concatenate(around).astype(np.float32)
     hits = occluded(world.tree, np.repeat(origins, rays, axis=0), directions)
     expected = sums_of(1.0 - hits.reshape(200, rays).astype(np.float64))
+    sums = sums_of_kernel(embree.packets(), rays)
     assert (np.abs(sums - expected) < 1e-9).all(axis=1).mean() > 0.95
+
+
+@pytest.mark.parametrize(
+    ("ground", "geometric"),
+    [(False, None), (True, None), (False, SLANTED)],
+    ids=["plain", "ground", "geometric"],
+)
+@pytest.mark.parametrize("rays", [5, 13, 40, 64])
+def test_packets_of_eight_and_sixteen_followed_together_or_not_add_up_alike(
+    rays: int, ground: bool, geometric: NDArray[np.float32] | None
+) -> None:
+    """Five fill part of a packet, forty an odd number of eights. Embree takes sixteen on any processor."""
+    ways = [
+        embree.packets(lanes=lanes, coherent=coherent)
+        for lanes in (8, 16)
+        for coherent in (False, True)
+    ]
+    first, *others = (sums_of_kernel(way, rays, ground=ground, geometric=geometric) for way in ways)
+    for other in others:
+        np.testing.assert_array_equal(other, first)
+
+
+@pytest.mark.parametrize("rays", [5, 40])
+def test_nearest_hits_of_eight_and_of_sixteen_fall_off_alike(rays: int) -> None:
+    ways = [embree.packets(lanes=lanes) for lanes in (8, 16)]
+    eight, sixteen = (sums_of_kernel(way, rays, falloff=LINEAR) for way in ways)
+    np.testing.assert_array_equal(eight, sixteen)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2**63, 2**64 - 1])
 def test_bits_are_mixed_as_in_whole_numbers(seed: int) -> None:
-    compiled = tight_kernel(mix)
+    compiled = kernel(mix)
     for index in (0, 1, 2**31, 10**12):
         assert int(compiled(np.uint64(seed), np.int64(index))) == mixed_bits(seed, index)
 
@@ -168,7 +215,7 @@ def test_bits_are_mixed_as_in_whole_numbers(seed: int) -> None:
 )
 def test_a_frame_is_orthonormal_and_right_handed(normal: tuple[float, float, float]) -> None:
     frame = np.empty((3, 3))
-    tight_kernel(turned_frame)(np.array(normal, np.float64), np.uint64(mixed_bits(3, 4)), frame)
+    kernel(turned_frame)(np.array(normal, np.float64), np.uint64(mixed_bits(3, 4)), frame)
     assert np.allclose(frame @ frame.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(frame) > 0.0
     assert np.allclose(frame[2], unit(normal), atol=1e-15)

@@ -1,4 +1,4 @@
-"""How many rays points get next, by what is known of them: at once what they surely need, then by doubling."""
+"""How many rays the next set of each point has, by what is known of it and of its neighbours."""
 
 from __future__ import annotations
 
@@ -7,121 +7,113 @@ import pytest
 from numpy.typing import NDArray
 
 from aobake.settings import BakeSettings, TraceSettings
-from aobake.tracing.rounds import APART, PAIRS, Tally, grown
-from tests.tracing.rays import sums_of
+from aobake.tracing.neighbours import Neighbours
+from aobake.tracing.rounds import AIM, PILOT, missing
+from aobake.tracing.sampling import SIZES
+from aobake.tracing.tally import Tally
+from tests.tracing.test_tally import sums
 
-FIRST = 32
-
-
-def sums(boundary: NDArray[np.float64], rays: int, noise: float = 0.0) -> NDArray[np.float64]:
-    """What half-open points of a boundary so long, and of so much noise a ray, tell with so many rays."""
-    rough = boundary * rays**0.5 + 2.0 * noise * rays
-    apart = PAIRS / 8 * (APART * boundary * rays**0.5 + 2.0 * noise * rays)
-    same = np.ones_like(boundary)
-    return np.column_stack([0.5 * rays * same, rough, rays * same, apart, rays / 8 * same])
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
-def tally(boundary: NDArray[np.float64], rays: int = FIRST) -> Tally:
-    """Half-open points of a boundary so long, after so many rays."""
-    found = Tally.blank(len(boundary), grows=True)
+def row(count: int) -> Neighbours:
+    """Points on a plane, one after the other."""
+    return Neighbours.along(np.arange(count), np.tile((0.0, 0.0, 1.0), (count, 1)))
+
+
+def after(boundary: FloatArray, rays: int) -> Tally:
+    """Half-open points of boundaries so long, after a set of so many rays."""
+    found = Tally.blank(len(boundary))
     found.add(np.arange(len(boundary)), sums(boundary, rays), rays)
     return found
 
 
-def told(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(P,) the standard error of points whose rays have these values, (P, rays)."""
-    found = Tally.blank(len(values), grows=False)
-    found.add(np.arange(len(values)), sums_of(values), values.shape[1])
-    return found.standard_error()
+def asked(**settings: object) -> TraceSettings:
+    chosen: TraceSettings = BakeSettings(**settings)  # type: ignore[arg-type]
+    return chosen
 
 
-def expected_error(boundary: NDArray[np.float64], rays: NDArray[np.int64]) -> NDArray[np.float64]:
-    """What is reported with so many rays if the boundary stays as long as it is."""
-    found = [tally(boundary[k : k + 1], int(n)).standard_error()[0] for k, n in enumerate(rays)]
-    return np.array(found)
+def with_next(tally: Tally, boundary: float, sizes: IntArray) -> FloatArray:
+    """The standard error once everyone has had the next set."""
+    for size in np.unique(sizes).tolist():
+        chosen = np.flatnonzero(sizes == size)
+        tally.add(chosen, sums(np.full(len(chosen), boundary), size), size)
+    return np.sqrt(tally.variance(row(len(sizes)).behind(tally)))
 
 
-def goals(boundary: NDArray[np.float64], **asked: object) -> NDArray[np.int64]:
-    chosen: TraceSettings = BakeSettings(**asked)  # type: ignore[arg-type]
-    return grown(tally(boundary), np.arange(len(boundary)), chosen)
-
-
+@pytest.mark.parametrize("boundary", [0.0, 0.5, 2.0, 5.0])
 @pytest.mark.parametrize("tolerance", [0.02, 0.005, 0.001])
-def test_points_go_at_once_to_where_they_are_nearly_done(tolerance: float) -> None:
-    boundary = np.linspace(0.5, 5.0, 40)
-    reached = goals(boundary, tolerance=tolerance, max_rays=1 << 20)
-    assert (reached > FIRST).all()
-    error = expected_error(boundary, reached)
-    alone = reached == 2 * FIRST  # one doubling is the least
+def test_the_next_set_is_as_large_as_it_takes(tolerance: float, boundary: float) -> None:
+    """Within what whole sizes, and a law of n^-1.5 for the few rays as well, leave over."""
+    found = after(np.full(40, boundary), 64)
+    sizes = missing(found, row(40), asked(tolerance=tolerance, max_rays=1 << 20))
+    error = with_next(found, boundary, sizes)
+    if sizes.any():
+        assert (error > 0.7 * tolerance).all()
     assert (error <= 1.1 * tolerance).all()
-    assert (expected_error(boundary, reached // 2)[~alone] > 1.1 * tolerance).all()
 
 
-def test_a_point_just_above_the_tolerance_doubles_and_one_below_is_done() -> None:
-    boundary = np.array([2.0])
-    error = float(expected_error(boundary, np.array([FIRST]))[0])
-    assert goals(boundary, tolerance=error * 0.99).tolist() == [2 * FIRST]
-    assert goals(boundary, tolerance=error * 1.01).tolist() == [FIRST]
+def test_a_point_above_the_tolerance_goes_on_and_one_below_is_done() -> None:
+    found = after(np.full(3, 2.0), 64)
+    error = float(np.sqrt(found.variance(row(3).behind(found)))[0])
+    assert missing(found, row(3), asked(tolerance=error * 1.01)).tolist() == [0, 0, 0]
+    above = missing(found, row(3), asked(tolerance=error * 0.99))
+    assert (above > 0).all()
+    assert (above < 64).all()  # what is missing, not twice as much
+
+
+def test_points_without_rays_get_at_once_what_their_neighbours_needed() -> None:
+    found, leading = Tally.blank(400), np.arange(0, 400, 4)
+    found.add(leading, sums(np.full(100, 2.0), 256), 256)
+    tolerance = float(np.sqrt(found.variance(row(400).behind(found))[0])) / AIM
+    sizes = missing(found, row(400), asked(tolerance=tolerance * 1.001))
+    assert (sizes[leading] == 0).all()
+    others = np.setdiff1d(np.arange(400), leading)
+    assert (sizes[others] == 256).all()
+
+
+def test_the_first_set_is_a_small_one() -> None:
+    assert missing(Tally.blank(3), row(3), asked(tolerance=0.01)).tolist() == [PILOT] * 3
 
 
 @pytest.mark.parametrize("form", ["each", "rms"])
 @pytest.mark.parametrize("most", [32, 63, 64, 1000])
 def test_no_point_gets_more_than_the_most(form: str, most: int) -> None:
-    reached = goals(np.full(5, 4.0), tolerance=1e-4, tolerance_of=form, max_rays=most)
-    assert (reached == 2 ** int(np.log2(most))).all()
+    found = after(np.full(5, 4.0), PILOT)
+    sizes = missing(found, row(5), asked(tolerance=1e-4, tolerance_of=form, max_rays=most))
+    assert (sizes == max(size for size in SIZES if size <= most - PILOT)).all()
+    full = after(np.full(5, 4.0), most - 7)
+    assert not missing(full, row(5), asked(tolerance=1e-4, max_rays=most)).any()
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.005])
 def test_a_common_tolerance_is_nearly_reached_at_once_and_rays_go_where_they_do_most(
     tolerance: float,
 ) -> None:
-    boundary = np.linspace(0.0, 5.0, 200)
-    reached = goals(boundary, tolerance=tolerance, tolerance_of="rms", max_rays=1 << 20)
-    error = float(np.sqrt(np.mean(expected_error(boundary, reached) ** 2)))
-    assert 0.8 * tolerance < error < 1.3 * tolerance
-    assert (np.diff(reached) >= 0).all()
-    assert reached[0] < reached[-1]
+    boundary = np.repeat(np.linspace(0.0, 5.0, 10), 50)
+    found = after(boundary, 16)
+    settings = asked(tolerance=tolerance, tolerance_of="rms", max_rays=1 << 20)
+    sizes = missing(found, row(500), settings)
+    for size in np.unique(sizes[sizes > 0]).tolist():
+        chosen = np.flatnonzero(sizes == size)
+        found.add(chosen, sums(boundary[chosen], size), size)
+    error = float(np.sqrt(np.mean(found.variance(row(500).behind(found)))))
+    assert 0.7 * tolerance < error < 1.2 * tolerance
+    of_each = sizes.reshape(10, 50).mean(axis=1)
+    assert (np.diff(of_each) >= 0).all()
+    # Neyman: n^2.5 in proportion to the boundary, in whole sizes; for each to reach it, it would be n^1.5.
+    assert 1.1 < of_each[-1] / of_each[4] < (9.0 / 4.0) ** 0.6
+    assert not missing(found, row(500), asked(tolerance=1.05 * error, tolerance_of="rms")).any()
 
 
-def test_nothing_grows_where_there_is_nothing_or_the_number_is_fixed() -> None:
-    assert len(goals(np.zeros(0), tolerance=0.01)) == 0
-    assert goals(np.ones(3), rays=64).tolist() == [FIRST] * 3
+def test_where_no_ray_counts_there_will_be_as_many_again() -> None:
+    """So that it does not take a thousand rounds to give up on them."""
+    found, nothing = Tally.blank(2), np.zeros((2, 5))
+    found.add(np.arange(2), nothing, 512)
+    assert missing(found, row(2), asked(tolerance=0.01, max_rays=4096)).tolist() == [512, 512]
 
 
-# -- the standard error ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("share", [0.1, 0.3, 0.5])
-def test_rays_that_err_independently_have_about_the_error_of_independent_rays(share: float) -> None:
-    values = (np.random.default_rng(1).random((2000, 256)) < share).astype(float)
-    error = np.sqrt(share * (1.0 - share) / 256)
-    assert 0.7 * error < float(np.sqrt(np.mean(told(values) ** 2))) < 1.1 * error
-
-
-def test_an_edge_along_the_curve_has_a_fifth_of_that_error() -> None:
-    values = (np.arange(256) < np.arange(40, 220)[:, None]).astype(float)
-    assert (told(values) < 0.2 * np.sqrt(0.25 / 256)).all()
-
-
-def test_as_many_differences_tell_more_error_where_they_are_no_line() -> None:
-    """Sixteen runs of eight open rays, and sixteen open rays alone: 32 differences each, of 256 rays."""
-    line, noise = np.zeros((2, 1, 256))
-    for first in range(4, 256, 16):
-        line[0, first : first + 8] = 1.0
-        noise[0, first] = 1.0
-    assert sums_of(line)[0, 1] == sums_of(noise)[0, 1] == 32.0
-    assert float(told(noise)[0]) > 1.5 * float(told(line)[0])
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.05])
-def test_the_parts_of_a_set_tell_what_the_whole_tells(noise: float) -> None:
-    boundary = np.linspace(0.5, 5.0, 10)
-    whole, grew = Tally.blank(10, grows=True), Tally.blank(10, grows=True)
-    whole.add(np.arange(10), sums(boundary, 512, noise), 512)
-    for rays in (32, 32, 64, 128, 256):
-        grew.add(np.arange(10), sums(boundary, rays, noise), rays)
-    assert np.allclose(grew.standard_error(), whole.standard_error(), rtol=1e-12)
-
-
-def test_few_rays_have_an_error_though_no_packet_is_whole() -> None:
-    assert np.isfinite(told(np.array([[0.0, 1.0, 1.0], [1.0, 1.0, 1.0]]))).all()
+def test_nobody_needs_a_set_where_there_is_nobody_or_the_number_is_fixed() -> None:
+    assert len(missing(Tally.blank(0), row(0), asked(tolerance=0.01))) == 0
+    assert not missing(after(np.ones(3), 32), row(3), asked(rays=64)).any()

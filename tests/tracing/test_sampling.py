@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from aobake.tracing.sampling import (
     LANES,
     SETS,
-    added_directions,
+    SIZES,
     direction_sets,
-    spiral_lattice,
     vogel_disc,
 )
 from tests.scenes import FloatArray
@@ -78,27 +76,17 @@ def test_sets_are_made_once_and_cannot_be_changed() -> None:
         direction_sets(32)[0, 0, 0, 0] = 0.0
 
 
-@pytest.mark.parametrize(("before", "after"), [(32, 64), (64, 512), (1024, 2048)])
-def test_a_set_that_grows_keeps_its_directions(before: int, after: int) -> None:
-    """What is there and what is added make up the larger set, each direction once."""
-    for number in range(SETS):
-        parts = [added_directions(0, before), added_directions(before, after)]
-        grown = np.concatenate([part[number].transpose(0, 2, 1).reshape(-1, 3) for part in parts])
-        whole = added_directions(0, after)[number].transpose(0, 2, 1).reshape(-1, 3)
-        assert len(grown) == after
-        by_place = [np.lexsort(np.round(each.T, 5)) for each in (grown, whole)]
-        assert np.allclose(grown[by_place[0]], whole[by_place[1]], atol=1e-5)
+def test_sizes_are_whole_packets_and_close_to_any_number() -> None:
+    sizes = np.array(SIZES)
+    assert (sizes % LANES == 0).all()
+    assert sizes[-1] == 1 << 20
+    assert (np.diff(sizes) > 0).all()
+    assert (sizes[1:] <= 1.26 * sizes[:-1])[sizes[1:] > 40].all()
 
 
-@pytest.mark.parametrize("count", [32, 256, 4096, 1 << 15])
-def test_a_set_that_grows_is_spread_evenly_at_every_size(count: int) -> None:
-    """Every wedge and every ring of the disc has its share; no two points come close."""
-    points = spiral_lattice(np.arange(count), count, 0.3)
-    area = np.sum(points**2, axis=1)
-    angle = (np.arctan2(points[:, 1], points[:, 0]) / (2.0 * np.pi)) % 1.0
-    bins = round(count**0.5 / 2)
-    for values in (area, angle):
-        held = np.bincount((values * bins).astype(int), minlength=bins)
-        assert np.abs(held - count / bins).max() <= 0.35 * count / bins + 2
-    nearest = cKDTree(points).query(points, k=2)[0][:, 1]
-    assert nearest.min() > 0.45 * np.sqrt(np.pi / count)
+def test_large_sets_are_fewer_so_that_none_takes_much_memory() -> None:
+    assert len(direction_sets(1 << 14)) == SETS
+    for size in ((1 << 14) + 8, 1 << 16, 1 << 18):
+        sets = len(direction_sets(size))
+        assert sets & (sets - 1) == 0  # a mask picks one of them
+        assert 1 <= sets <= (1 << 18) // size

@@ -8,17 +8,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from aobake import BakedVertices, BakeSettings, Instance, Mesh, Scene, bake_vertices, visibility
+from aobake import BakedVertices, BakeSettings, Instance, Scene, bake_vertices, visibility
 from tests.scenes import (
     TURNED,
     UP,
     FloatArray,
     Triangles,
+    affine,
     box,
     flipped,
     floor,
     icosphere,
     joined,
+    mesh_of,
     moved,
     patch,
     rotation,
@@ -26,19 +28,6 @@ from tests.scenes import (
 )
 
 RAYS = 512
-
-
-def affine(linear: object = 1.0, shift: object = (0.0, 0.0, 0.0)) -> FloatArray:
-    """(4, 4) transform."""
-    matrix = np.eye(4)
-    part = np.asarray(linear, np.float64)
-    matrix[:3, :3] = part * np.eye(3) if part.ndim == 0 else part
-    matrix[:3, 3] = np.asarray(shift, np.float64)
-    return matrix
-
-
-def mesh_of(mesh: Triangles, normals: FloatArray | None = None) -> Mesh:
-    return Mesh(vertices=mesh.vertices, faces=mesh.faces, normals=normals)
 
 
 def in_one_piece(scene: Scene) -> tuple[Scene, NDArray[np.int64]]:
@@ -95,7 +84,7 @@ def test_instances_are_as_open_as_the_scene_in_one_piece(name: str) -> None:
     a, b, c = cup.vertices[cup.faces].transpose(1, 0, 2)
     normals = np.repeat(np.cross(b - a, c - a), 3, axis=0)
     instances = tuple(Instance(mesh=0, transform=transform) for transform in TRANSFORMS[name])
-    scene = Scene(meshes=(mesh_of(cup, normals),), instances=instances)
+    scene = Scene(meshes=(mesh_of(cup, normals=normals),), instances=instances)
     whole, starts = in_one_piece(scene)
     settings = BakeSettings(rays=RAYS)
     one, other = bake_vertices(scene, settings), bake_vertices(whole, settings)

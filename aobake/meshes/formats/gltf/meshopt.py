@@ -14,6 +14,7 @@ from aobake.errors import InputError
 from aobake.meshes.formats.gltf import meshopt_index_kernels as index_kernels
 from aobake.meshes.formats.gltf import meshopt_kernels as kernels
 from aobake.meshes.formats.gltf.element import Element
+from aobake.tracing.arena import reserved
 
 __all__ = ["decompress"]
 
@@ -30,6 +31,7 @@ PROBLEMS = {
 }
 # A block of 256 elements takes a byte for each four of their bytes at least; a triangle takes one.
 ELEMENTS_PER_BYTE = 1024
+SCRATCH = 2048, 5  # bytes and pieces of memory: the last element, modes, and deltas of 256 elements
 
 
 def decompress(stream: memoryview, packed: Element) -> memoryview:
@@ -48,11 +50,11 @@ def decompress(stream: memoryview, packed: Element) -> memoryview:
     data = np.frombuffer(stream, np.uint8)
     if mode == "ATTRIBUTES":
         out = np.empty(count * stride, np.uint8)
-        status = kernels.attributes(data, count, stride, out)
+        status = kernels.attributes(reserved(*SCRATCH), data, count, stride, out)
     else:
         words = np.empty(count, np.uint32)
         decode = index_kernels.triangles if mode == "TRIANGLES" else index_kernels.indices
-        status = decode(data, count, words)
+        status = decode(reserved(*SCRATCH), data, count, words)
         out = words.astype(np.uint16 if stride == 2 else np.uint32, copy=False).view(np.uint8)
     if status:
         raise InputError(f"{packed.where}: the stream {PROBLEMS[int(status)]}. Export it again.")

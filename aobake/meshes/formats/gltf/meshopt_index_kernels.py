@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aobake.meshes.formats.gltf.meshopt_kernels import CUT, HEADER, REFERENCE, TAIL
-from aobake.tracing.compiled import kernel, routine
+from aobake.tracing.arena import zeros
+from aobake.tracing.compiled import inlined, kernel
 
 __all__ = ["indices", "triangles"]
 
@@ -27,7 +28,7 @@ WRAP = 0xFFFFFFFF
 AT, NEXT, LAST, EDGES, VERTICES = 0, 1, 2, 3, 4
 
 
-@routine
+@inlined
 def _varint(data: ByteArray, at: Whole, end: Whole) -> tuple[Whole, Whole]:
     """An unsigned number of up to five bytes and where reading goes on, or -1."""
     value = np.int64(0)
@@ -43,14 +44,14 @@ def _varint(data: ByteArray, at: Whole, end: Whole) -> tuple[Whole, Whole]:
 
 
 @kernel
-def indices(data: ByteArray, count: Whole, out: WordArray) -> Whole:
+def indices(arena: ByteArray, data: ByteArray, count: Whole, out: WordArray) -> Whole:
     """Decode `count` indices of any kind into out, (count,)."""
     if len(data) < 1 or data[0] != 0xD1:
         return HEADER
     end = len(data) - 4
     if end < 1:
         return CUT
-    last = np.zeros(2, np.int64)
+    last = zeros(arena, 2, np.int64)
     at: Whole = np.int64(1)
     for i in range(count):
         value, at = _varint(data, at, end)
@@ -62,7 +63,7 @@ def indices(data: ByteArray, count: Whole, out: WordArray) -> Whole:
     return 0 if at == end else TAIL
 
 
-@routine
+@inlined
 def _new(state: State) -> Whole:
     """The next new vertex."""
     vertex = state[NEXT]
@@ -70,7 +71,7 @@ def _new(state: State) -> Whole:
     return np.int64(vertex)
 
 
-@routine
+@inlined
 def _explicit(data: ByteArray, end: Whole, state: State) -> Whole:
     """A vertex given by its distance from the last such one, or -1."""
     value, at = _varint(data, state[AT], end)
@@ -81,20 +82,20 @@ def _explicit(data: ByteArray, end: Whole, state: State) -> Whole:
     return np.int64(state[LAST])
 
 
-@routine
+@inlined
 def _keep_vertex(vertices: State, state: State, vertex: Whole) -> None:
     vertices[state[VERTICES] & 15] = vertex
     state[VERTICES] += 1
 
 
-@routine
+@inlined
 def _keep_edge(edges: State, state: State, a: Whole, b: Whole) -> None:
     edges[state[EDGES] & 15, 0] = a
     edges[state[EDGES] & 15, 1] = b
     state[EDGES] += 1
 
 
-@routine
+@inlined
 def _on_edge(
     data: ByteArray,
     end: Whole,
@@ -128,7 +129,7 @@ def _on_edge(
     return 0
 
 
-@routine
+@inlined
 def _on_its_own(
     data: ByteArray, end: Whole, ways: State, state: State, vertices: State, abc: State
 ) -> Whole:
@@ -150,7 +151,7 @@ def _on_its_own(
     return 0
 
 
-@routine
+@inlined
 def _ways(data: ByteArray, end: Whole, low: Whole, state: State, ways: State) -> Whole:
     """How the corners of a triangle on its own are given; the status."""
     ways[0] = 15 if low == 15 else 0
@@ -170,17 +171,17 @@ def _ways(data: ByteArray, end: Whole, low: Whole, state: State, ways: State) ->
 
 
 @kernel
-def triangles(data: ByteArray, count: Whole, out: WordArray) -> Whole:
+def triangles(arena: ByteArray, data: ByteArray, count: Whole, out: WordArray) -> Whole:
     """Decode `count` / 3 triangles into out, (count,)."""
     if len(data) < 1 or data[0] != 0xE1:
         return HEADER
     end = len(data) - 16
-    state = np.zeros(5, np.int64)
+    state = zeros(arena, 5, np.int64)
     state[AT] = 1 + count // 3
     if state[AT] > end:
         return CUT
-    edges, vertices = np.zeros((16, 2), np.int64), np.zeros(16, np.int64)
-    abc, ways = np.zeros(3, np.int64), np.zeros(3, np.int64)
+    edges, vertices = zeros(arena, (16, 2), np.int64), zeros(arena, 16, np.int64)
+    abc, ways = zeros(arena, 3, np.int64), zeros(arena, 3, np.int64)
     for t in range(count // 3):
         code = np.int64(data[1 + t])
         if code >> 4 < 15:

@@ -11,7 +11,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.tracing.compiled import kernel, routine
+from aobake.tracing.arena import zeros
+from aobake.tracing.compiled import inlined, kernel
 
 __all__ = ["CUT", "HEADER", "REFERENCE", "TAIL", "attributes"]
 
@@ -26,7 +27,7 @@ GROUP = 16
 ZERO, LITERAL = 2, 3  # control modes of version 1 that hold no groups
 
 
-@routine
+@inlined
 def _group(data: ByteArray, at: Whole, bits: Whole, out: ByteArray, start: Whole) -> Whole:
     """Sixteen deltas of `bits` bits each, sentinels followed by whole bytes; where reading goes on, or -1."""
     if bits == 0:
@@ -55,7 +56,7 @@ def _group(data: ByteArray, at: Whole, bits: Whole, out: ByteArray, start: Whole
     return extra
 
 
-@routine
+@inlined
 def _bytes(data: ByteArray, at: Whole, count: Whole, mode: Whole, out: ByteArray) -> Whole:
     """The deltas of one byte of all elements of a block; where reading goes on, or -1.
 
@@ -80,7 +81,7 @@ def _bytes(data: ByteArray, at: Whole, count: Whole, mode: Whole, out: ByteArray
     return at
 
 
-@routine
+@inlined
 def _byte_deltas(
     deltas: ByteArray, count: Whole, last: ByteArray, out: ByteArray, first: Whole, stride: Whole
 ) -> None:
@@ -94,7 +95,7 @@ def _byte_deltas(
         last[j] = value
 
 
-@routine
+@inlined
 def _short_deltas(
     deltas: ByteArray, count: Whole, last: ByteArray, out: ByteArray, first: Whole, stride: Whole
 ) -> None:
@@ -110,7 +111,7 @@ def _short_deltas(
         last[j + 1] = value >> 8
 
 
-@routine
+@inlined
 def _word_deltas(
     deltas: ByteArray,
     count: Whole,
@@ -135,7 +136,7 @@ def _word_deltas(
         last[j] = (value >> (8 * j)) & 0xFF
 
 
-@routine
+@inlined
 def _four_bytes(
     data: ByteArray, at: Whole, end: Whole, block: Whole, control: Whole, deltas: ByteArray
 ) -> Whole:
@@ -161,7 +162,7 @@ def _four_bytes(
     return at
 
 
-@routine
+@inlined
 def _block(
     data: ByteArray,
     at: Whole,
@@ -199,7 +200,9 @@ def _block(
 
 
 @kernel
-def attributes(data: ByteArray, count: Whole, stride: Whole, out: ByteArray) -> Whole:
+def attributes(
+    arena: ByteArray, data: ByteArray, count: Whole, stride: Whole, out: ByteArray
+) -> Whole:
     """Decode `count` elements of `stride` bytes into out, (count * stride,); versions 0 and 1."""
     if len(data) < 1 or (data[0] != 0xA0 and data[0] != 0xA1):
         return HEADER
@@ -209,7 +212,7 @@ def attributes(data: ByteArray, count: Whole, stride: Whole, out: ByteArray) -> 
     end = len(data) - tail
     if end < 1:
         return CUT
-    last, modes = np.empty(stride, np.uint8), np.empty(channels, np.uint8)
+    last, modes = zeros(arena, stride, np.uint8), zeros(arena, channels, np.uint8)
     for k in range(stride):
         last[k] = data[len(data) - channels - stride + k]
     for k in range(channels):
@@ -218,7 +221,7 @@ def attributes(data: ByteArray, count: Whole, stride: Whole, out: ByteArray) -> 
         if mode & 15 > 2 or (mode & 15 < 2 and mode >> 4 != 0):
             return REFERENCE
     most = min((BLOCK_BYTES // stride) & ~15, MOST_IN_BLOCK)
-    deltas = np.zeros((4, MOST_IN_BLOCK), np.uint8)
+    deltas = zeros(arena, (4, MOST_IN_BLOCK), np.uint8)
     at: Whole = np.int64(1)
     done: Whole = np.int64(0)
     while done < count:
