@@ -25,6 +25,7 @@ __all__ = [
     "Peer",
     "ask",
     "environment",
+    "in_short",
     "levels_table",
     "rms",
     "time_table",
@@ -161,3 +162,27 @@ def time_table(
         rows.append(row)
     columns = ["baker", *(c for e in errors for c in (f"s to {e:g}", "times ours"))]
     return Table(title, columns, rows, {"ours": ours}, note)
+
+
+def in_short(
+    title: str,
+    levels: Sequence[Level],
+    error: float,
+    ours: Sequence[str],
+    further: Sequence[tuple[str, float]] = (),
+) -> Table:
+    """Seconds to one error alone, the fastest first, as multiples of the best of ours.
+
+    further : (what, seconds) that are no bakers' levels
+    """
+    bakers = dict.fromkeys(level.baker for level in levels)
+    times = {baker: time_to([x for x in levels if x.baker == baker], error) for baker in bakers}
+    found = [(baker, time[0]) for baker, time in times.items() if time is not None]
+    best = min((seconds for baker, seconds in found if baker in ours), default=None)
+    rows: list[list[Cell]] = [
+        [what, seconds, None if best is None else seconds / best]
+        for what, seconds in sorted([*found, *further], key=lambda pair: pair[1])
+    ]
+    return Table(
+        title, ("baker", f"seconds to RMSE {error:g}", "times the fastest of aobake"), rows
+    )

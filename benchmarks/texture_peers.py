@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from bare import Bare
 from numpy.typing import NDArray
-from rivals import FloatArray, Level, Peer, ask, levels_table, rms, time_table, time_to
+from rivals import FloatArray, Level, Peer, ask, in_short, levels_table, rms, time_table, time_to
 from scipy.ndimage import label
 from tables import Skipped, Spread, Table
 from texture import unwrapped
@@ -37,8 +37,9 @@ FIXED, DENOISED, AUTO = "aobake, fixed rays", "aobake, denoised", "aobake, as it
 RAYS, QUICK_RAYS = (16, 32, 64, 128, 256), (16, 64)
 GUIDED, QUICK_GUIDED = (4, 8, 16, 32, 64, 128), (16, 64)
 ERRORS = (0.02, 0.01, 0.005)
+IN_SHORT = 0.005
 PEERS = (
-    Peer("Blender Cycles", "blender", (4, 16, 64, 256), (4, 16)),
+    Peer("Blender Cycles", "blender", (16, 64, 256, 1024), (4, 16)),
     Peer("Blender Cycles, its defaults", "blender", (4096,), (), asked={"adaptive": True}),
 )
 
@@ -162,13 +163,15 @@ def native_levels(of: Lit, rays: Sequence[int], texels: int) -> list[Level]:
     return levels
 
 
-def tables_of(faces: int, size: int, reference: int, repeats: int, quick: bool) -> Iterator[Table]:
-    """Everyone on one texture."""
+def tables_of(
+    faces: int, size: int, reference: int, repeats: int, *, quick: bool, defaults: bool
+) -> Iterator[Table]:
+    """Everyone on one texture; Cycles with its defaults takes many minutes, and no part in the comparison."""
     of = lit(faces, size, reference)
     bake = aobake.BakeSettings(size=min(size, 256), rays=1)
     aobake.bake_texture(of.scene, bake)  # compiled now
     levels, absent, answers = [], [], []
-    for peer in PEERS:
+    for peer in PEERS if defaults else PEERS[:1]:
         found, reason, told = peer_levels(of, peer, quick)
         levels += found
         answers += told
@@ -188,13 +191,14 @@ def tables_of(faces: int, size: int, reference: int, repeats: int, quick: bool) 
         key=lambda b: (time_to([x for x in levels if x.baker == b], 0.01) or [1e9])[0],
     )
     yield time_table(f"{size} x {size}: time to an error", levels, ERRORS, best, "; ".join(absent))
+    yield in_short(f"{size} x {size}: in short", levels, IN_SHORT, (FIXED, DENOISED, AUTO))
     yield settings_table(answers[:1])
 
 
 def run(quick: bool) -> Iterator[Table]:
     """Textures of 512 and 1024."""
     if quick:
-        yield from tables_of(2_000, 128, 512, 1, quick)
+        yield from tables_of(2_000, 128, 512, 1, quick=True, defaults=False)
         return
     for size in (512, 1024):
-        yield from tables_of(20_000, size, 2048, 3, quick)
+        yield from tables_of(20_000, size, 2048, 3, quick=False, defaults=size == 512)
