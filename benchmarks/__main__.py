@@ -39,7 +39,10 @@ def benchmarks() -> dict[str, str]:
 
 
 def measured(name: str, *, quick: bool) -> dict[str, object]:
-    """Run one benchmark in this process, and print its tables as they come. The record of it."""
+    """Run one benchmark in this process, and print its tables as they come. The record of it.
+
+    Ctrl-C ends it: what has been measured until then is kept.
+    """
     before, start = machine.load(), time.perf_counter()
     record: dict[str, object] = {
         "benchmark": name,
@@ -51,6 +54,9 @@ def measured(name: str, *, quick: bool) -> dict[str, object]:
         for table in importlib.import_module(name).run(quick):
             print(table.markdown(), flush=True)
             tables.append(table)
+    except KeyboardInterrupt:
+        print("stopped: the tables above are kept\n", flush=True)
+        record["stopped"] = True
     except Skipped as reason:
         print(f"skipped: {reason}\n", flush=True)
         record["skipped"] = str(reason)
@@ -84,7 +90,13 @@ def every(names: list[str], folder: Path, *, quick: bool) -> list[str]:
     for name in names:
         print(f"## {name}\n\n{titles[name]}\n", flush=True)
         command = [sys.executable, str(HERE), name, "--here", "--results", str(folder)]
-        if subprocess.run(command + ["--quick"] * quick, check=False).returncode:
+        running = subprocess.Popen(command + ["--quick"] * quick)
+        try:
+            status = running.wait()
+        except KeyboardInterrupt:  # it has been told as well, and writes down what it has
+            running.wait()
+            sys.exit("stopped")
+        if status:
             failed.append(name)
     return failed
 

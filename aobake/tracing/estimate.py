@@ -270,7 +270,7 @@ def _next_sets(
     going = np.flatnonzero(sizes)
     wanted = np.zeros(len(work.origins), np.int64)
     wanted[points] = sizes
-    sets = {size: work.sets(size) for size in np.unique(sizes[going]).tolist()}
+    sets = {size: work.sets(size) for size in set(sizes[going].tolist())}
 
     def go_on(block: IntArray) -> None:
         of, sums = wanted[block], np.empty((len(block), SUMS))

@@ -38,7 +38,7 @@ LEAST = (
 )
 NEAR = 1.5  # times the variance that it should have, a point is left alone if all together have to be good enough
 PARTS = 1.1  # times as much variance, on average, as one set of as many rays would have
-BISECTIONS = 32
+BISECTIONS = 16  # of 60 octaves: to a thousandth of one
 SIZE_STEPS = tuple(len(SIZES) >> k for k in range(1, len(SIZES).bit_length()))
 BETWEEN = np.sqrt(np.array(SIZES[1:], float) * np.array(SIZES[:-1], float))
 
@@ -124,7 +124,7 @@ def equal_fixed_rays(standard_error: NDArray[np.float32], rays: NDArray[np.int32
     goal = float(np.mean(np.square(error)))
     line = float(np.mean(_line(error, n)))
     low, high = 0.0, 64.0  # as powers of two
-    for _ in range(2 * BISECTIONS):
+    for _ in range(4 * BISECTIONS):
         middle = 0.5 * (low + high)
         size = 2.0**middle
         variance = ((SPREAD + FEW / size) * line * math.sqrt(size) + UNSEEN**2) / size**2
