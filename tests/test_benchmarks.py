@@ -135,6 +135,12 @@ def run(quick):
     raise Skipped("there is no peer")
     yield
 '''
+STOPPED = '''"""One that somebody stops."""
+from tables import Table
+def run(quick):
+    yield Table("T", ("n",), [[7]])
+    raise KeyboardInterrupt
+'''
 
 
 @pytest.fixture
@@ -163,6 +169,18 @@ def test_the_runner_records_what_it_measured_and_goes_on_after_a_failure(runner:
     assert {"machine", "versions", "load", "date", "commit", "peak_memory"} <= records[0].keys()
     assert json.loads((results / "absent.jsonl").read_text().splitlines()[0])["skipped"]
     assert not (results / "broken.jsonl").exists()
+
+
+def test_a_benchmark_that_is_stopped_keeps_what_it_had_measured(runner: Path) -> None:
+    (runner / "stopped.py").write_text(STOPPED)
+    results = runner / "kept"
+    assert (
+        "stopped: the tables above"
+        in python(str(runner), "stopped", "--results", str(results)).stdout
+    )
+    record = json.loads((results / "stopped.jsonl").read_text())
+    assert record["stopped"]
+    assert record["tables"][0]["rows"] == [[7]]
 
 
 def test_the_runner_names_the_benchmarks_it_knows(runner: Path) -> None:
