@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-__all__ = ["ROOT", "modules_after", "one_line", "python"]
+__all__ = ["ROOT", "heeds_interrupts", "modules_after", "one_line", "python"]
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -36,3 +37,8 @@ def modules_after(code: Sequence[str]) -> set[str]:
     done = python("-c", "\n".join([*code, shown]))
     assert done.returncode == 0, done.stderr
     return set(done.stdout.split()[-400:])
+
+
+def heeds_interrupts() -> None:
+    """For preexec_fn: jobs in the background of a shell ignore SIGINT, and so would what they start."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -16,7 +16,7 @@ import pytest
 
 import aobake
 from tests.conftest import Run
-from tests.support import modules_after, one_line
+from tests.support import heeds_interrupts, modules_after, one_line
 
 
 def colours(path: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
@@ -175,6 +175,7 @@ def test_a_signal_ends_a_long_bake_within_a_second_and_leaves_nothing(
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": ""},
+        preexec_fn=heeds_interrupts,  # noqa: PLW1509 - no threads yet
     )
     time.sleep(2.5)  # into compiling or tracing, both of which take longer than that
     assert process.poll() is None

@@ -18,7 +18,7 @@ from aobake.tracing import blocks
 from aobake.tracing.rounds import equal_fixed_rays
 from tests.known import known_scenes
 from tests.scenes import TURNED, UP, Triangles, box, floor, icosphere, joined, moved
-from tests.support import ROOT
+from tests.support import ROOT, heeds_interrupts
 
 
 def still_life() -> Scene:
@@ -292,6 +292,7 @@ def test_an_interrupt_ends_a_bake_within_a_second_or_so() -> None:
     with subprocess.Popen(
         [sys.executable, "-c", LONG_BAKE],
         cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=heeds_interrupts,  # noqa: PLW1509 - no threads yet
     ) as process:  # fmt: skip
         assert process.stdout is not None
         assert process.stderr is not None
