@@ -60,6 +60,13 @@ def mesh_of(triangles: Triangles, **more: object) -> Mesh:
     return Mesh(vertices=triangles.vertices, faces=triangles.faces, **more)  # type: ignore[arg-type]
 
 
+def obj_text(mesh: Triangles) -> str:
+    """An OBJ file of one mesh."""
+    vertices = [f"v {x:.6g} {y:.6g} {z:.6g}" for x, y, z in mesh.vertices]
+    faces = [f"f {a} {b} {c}" for a, b, c in np.asarray(mesh.faces) + 1]
+    return "\n".join([*vertices, *faces]) + "\n"
+
+
 def joined(*parts: Triangles) -> Triangles:
     """Several meshes as one; nothing is welded."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])[:-1]

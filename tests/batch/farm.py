@@ -11,13 +11,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-
 from aobake.batch.tasks import Executor, Outcome, Remote, Task
 from aobake.config import Configured
 from aobake.jobs import Command, Job
 from aobake.settings import BakeSettings, ImageSettings, StoreSettings
-from tests.scenes import Triangles, icosphere, joined, patch
+from tests.scenes import icosphere, joined, obj_text, patch
 
 __all__ = ["LIMIT_S", "Farm", "all_of", "far", "farm", "floor_and_ball", "task_of", "tree", "until"]
 
@@ -109,12 +107,6 @@ def floor_and_ball(path: Path, fine: int = 2) -> None:
     )
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(obj_text(mesh), encoding="ascii")
-
-
-def obj_text(mesh: Triangles) -> str:
-    vertices = [f"v {x:.6g} {y:.6g} {z:.6g}" for x, y, z in mesh.vertices]
-    faces = [f"f {a} {b} {c}" for a, b, c in np.asarray(mesh.faces) + 1]
-    return "\n".join([*vertices, *faces]) + "\n"
 
 
 def task_of(

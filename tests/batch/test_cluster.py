@@ -25,6 +25,7 @@ from tests.batch.farm import LIMIT_S, Farm, all_of, farm, floor_and_ball, task_o
 pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
 
 LONG = BakeSettings(rays=1 << 13)  # a second of work or two
+ENDLESS = BakeSettings(rays=1 << 20)  # minutes
 
 
 @pytest.fixture(scope="module")
@@ -97,8 +98,8 @@ def test_a_job_that_breaks_fails_alone_and_leaves_its_worker_alive(two: Farm, as
             executor,
             [
                 task_of(source, target, "broken.obj", 1),
-                task_of(source, target, "long.obj", 2, bake=LONG, timeout=0.3),
-                task_of(source, target, "large.obj", 3, bake=LONG, memory=64 << 20),
+                task_of(source, target, "long.obj", 2, bake=ENDLESS, timeout=0.3),
+                task_of(source, target, "large.obj", 3, bake=ENDLESS, memory=64 << 20),
                 task_of(source, target, "ball 0.obj", 4),
             ],
         )
@@ -113,8 +114,7 @@ def test_a_stop_ends_what_runs_and_frees_the_workers(two: Farm, assets: Path) ->
     source, target = assets / "in", assets / "out"
     with ClusterExecutor(two.address, patience=LIMIT_S) as executor:
         for number in (1, 2):
-            endless = BakeSettings(rays=1 << 20)
-            executor.start(task_of(source, target, "long.obj", number, bake=endless))
+            executor.start(task_of(source, target, "long.obj", number, bake=ENDLESS))
         stopped = executor.stop(grace=0.0)
         assert sorted((o.number, o.status) for o in stopped) == [(1, "stopped"), (2, "stopped")]
     with ClusterExecutor(two.address, patience=LIMIT_S) as executor:
@@ -149,7 +149,7 @@ def test_a_texture_in_tiles_over_two_workers_is_the_same_byte_by_byte(
 def test_a_scheduler_that_is_gone_is_one_line_and_no_hang(
     assets: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    task = task_of(assets / "in", assets / "out", "long.obj", bake=BakeSettings(rays=1 << 20))
+    task = task_of(assets / "in", assets / "out", "long.obj", bake=ENDLESS)
     with (
         farm(assets, workers=1) as made,
         ClusterExecutor(made.address, patience=LIMIT_S) as executor,
