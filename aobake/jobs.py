@@ -127,11 +127,9 @@ def bake_scene(
     inputs : the files that it was read from; seconds : the stages so far, added to
     """
     from aobake.results import save
-    from aobake.tracing.compiled import compile_alone
 
     bake, notes = _vertices(scene, job) if job.command == "vertex" else _texture(scene, job)
     read = report.digests(inputs if digests else ())  # now: the output may replace an input
-    compile_alone()
     with guard():
         baked = (instead or bake)(scene, job.chosen.bake, progress=progress)
     chosen, said = job.chosen, notes(baked)

@@ -40,9 +40,7 @@ def _bake_little(command: Command, settings: BakeSettings, *, shown: bool) -> No
     from aobake.bake import bake_vertices
     from aobake.batch.pictures import thumbnails
     from aobake.lightmaps import bake_texture
-    from aobake.tracing.compiled import compile_alone
 
-    compile_alone()
     # Normals that are given and normals that are not, and charts with seams.
     corners = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)])
     outward = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)])

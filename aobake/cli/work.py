@@ -10,6 +10,7 @@ from aobake.cli import terminal
 from aobake.cli.leaving import leaving_promptly
 from aobake.cli.options import CommonOptions, SourceOptions
 from aobake.config import Command, Configured
+from aobake.tracing.compiled import compile_alone
 
 __all__ = ["bake_file", "bake_in_memory"]
 
@@ -37,6 +38,7 @@ def bake_file(
 
 
 def _do(job: jobs.Job, common: CommonOptions) -> None:
+    compile_alone()
     compile_ahead(job.command)
     with terminal.progress_bar(quiet=common.quiet) as progress:
         done = jobs.run_job(
@@ -47,6 +49,7 @@ def _do(job: jobs.Job, common: CommonOptions) -> None:
 
 def bake_in_memory(scene: Scene, job: jobs.Job, common: CommonOptions) -> None:
     """The same for a scene that is in no file."""
+    compile_alone()
     compile_ahead(job.command)
     with terminal.progress_bar(quiet=common.quiet) as progress:
         done = jobs.bake_scene(
