@@ -137,6 +137,7 @@ def build_tree(
     The tree is the robust one: closed meshes leak no ray at edges. Raises EngineError.
     Tried: building it in a thread beside the normals. Embree builds in all threads already (39 ms of processors
     for 70,000 triangles, 20 of them in the calling thread), and both together took as long as one after the other.
+    Devices with huge pages, threads that start at once, AVX2 alone: 28 ms of processors each, as without.
     """
     library, device = _library(), _device()
     scene = _new_scene()

@@ -34,7 +34,8 @@ __all__ = ["FOLDER_VARIABLE", "Kept", "folder", "problem"]
 
 FOLDER_VARIABLE = "AOBAKE_CACHE_DIR"
 ENDING = ".kernel"
-MAKING = ("arguments.py", "translate.py", "machine.py")  # beside a kernel's own source
+# beside a kernel's own source
+MAKING = ("arguments.py", "translate.py", "gathering.py", "machine.py")
 DIGEST_BYTES = 32
 MOST_BYTES = 64 << 20  # of all files: some 500 kernels; a bake of every kind needs about 60
 DAY_S = 86400.0

@@ -7,6 +7,7 @@ it: neither now, nor in a process that finds the code on disk.
 
 from __future__ import annotations
 
+import functools
 import importlib
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -37,25 +38,26 @@ def hurry() -> None:
     """Import numba in less time, and let it compile in less; for a process in which nobody else uses it.
 
     Its array functions ask for scipy's linear algebra when they are first imported, for np.dot, which no kernel of
-    ours calls: 0.17 s. And it makes every function fast by itself, and again within each that calls it: a sixth of
-    all compiling, for nothing, since machine.py does so once for a kernel as a whole.
+    ours calls: 0.17 s. And it makes every function fast by itself, and machine code of it, and again within each
+    that calls it: a third of all compiling, for nothing, since machine.py does so once for a kernel as a whole.
     """
     blas = "scipy.linalg.cython_blas"
     if blas not in sys.modules:
         sys.modules[blas] = None  # type: ignore[assignment]  # Python's way to say: not there
         try:
-            config = importlib.import_module("numba").config
             importlib.import_module("numba.np.arraymath")
-            config.OPT = type(config.OPT)(0)
         finally:
             del sys.modules[blas]
+        from aobake.tracing.gathering import gather
+
+        gather()
 
 
 def introduce(function: Callable[..., object]) -> None:
     """Tell numba of a function that kernels call."""
     from numba.extending import register_jitable
 
-    register_jitable(**OPTIONS)(function)
+    register_jitable(**_options())(function)
 
 
 def introduce_operation(definition: Callable[..., object]) -> None:
@@ -110,18 +112,28 @@ def as_callback(function: Callable[..., object], *, returns: type[bool] | None) 
 
 def _compiled(
     function: Callable[..., object], kinds: tuple[Any, ...]
-) -> tuple[tuple[str, str, ir.FunctionType], Any]:
-    """The intermediate language of a function, its name there and its type; and numba's type of its result."""
+) -> tuple[tuple[llvm.ModuleRef, str, ir.FunctionType], Any]:
+    """The module of a function, its name there and its type; and numba's type of its result."""
     import numba
     from numba.core.registry import cpu_target
 
-    compiler: Any = numba.njit(**OPTIONS)(function)  # type: ignore[call-overload]
+    from aobake.tracing.gathering import module_of
+
+    compiler: Any = numba.njit(**_options())(function)
     compiler.compile(kinds)
     made = compiler.overloads[kinds]
     result = made.signature.return_type
     convention = cpu_target.target_context.call_conv
     kind = convention.get_function_type(result, kinds)
-    return (compiler.inspect_llvm(kinds), made.fndesc.mangled_name, kind), result
+    return (module_of(made.library), made.fndesc.mangled_name, kind), result
+
+
+@functools.cache
+def _options() -> dict[str, Any]:
+    """How numba is to compile kernels and the functions that they call."""
+    from aobake.tracing.gathering import KernelPasses
+
+    return {**OPTIONS, "pipeline_class": KernelPasses}
 
 
 def _call(
@@ -133,13 +145,12 @@ def _call(
 
 
 def _around(
-    compiled: tuple[str, str, ir.FunctionType],
+    compiled: tuple[llvm.ModuleRef, str, ir.FunctionType],
     signature: ir.FunctionType,
     body: Callable[[ir.IRBuilder, ir.Function, Sequence[ir.Value]], None],
 ) -> bytes:
     """Object code of a function with a C function around it."""
-    text, name, kind = compiled
-    whole = llvm.parse_assembly(text)
+    whole, name, kind = compiled
     around = ir.Module("entry")
     around.triple, around.data_layout = whole.triple, whole.data_layout
     entry = ir.Function(around, signature, machine.ENTRY)

@@ -41,6 +41,18 @@ def total(values):
 def same(value):
     return value
 """
+ALONE = """
+from aobake.tracing.compiled import compile_alone
+compile_alone()
+import numpy as np
+import toy
+print(toy.total(np.arange(4.0)))
+import numba
+try:
+    print(numba.njit(lambda value: value + 1)(1))
+except RuntimeError as error:
+    print(error)
+"""
 BAKE = r"""
 import sys
 from numba.core import event
@@ -93,6 +105,14 @@ def test_of_two_processes_one_compiles_and_a_new_release_that_was_moved_finds_it
     moved = site.rename(tmp_path / "elsewhere")
     (moved / "toy.py").write_text("# a new release\n" + TOTAL, encoding="utf-8")
     assert said(started(KERNEL, moved, cache)) == ["0"]
+
+
+def test_a_process_that_compiles_kernels_alone_refuses_what_is_none_of_them(tmp_path: Path) -> None:
+    (tmp_path / "toy.py").write_text(TOTAL, encoding="utf-8")
+    assert said(started(ALONE, tmp_path, tmp_path / "kept")) == [
+        "6.0",
+        "numba serves kernels alone in this process, see compile_alone.",
+    ]
 
 
 def test_a_smallest_bake_needs_few_kernels_and_another_installation_compiles_none(
