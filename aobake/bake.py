@@ -144,11 +144,11 @@ def visibility(
 
 def _fixed_rays(found: Estimates, settings: BakeSettings, *, fitted: bool) -> int | None:
     """Rays that a fixed count would have taken for the same root mean square error; None without a tolerance."""
+    if settings.tolerance is None or fitted:
+        return None
     traced = found.rays > 0
     each = equal_fixed_rays(found.standard_error[traced], found.rays[traced])
-    if settings.tolerance is None or fitted or each is None:
-        return None
-    return round(each * int(traced.sum()))
+    return None if each is None else round(each * int(traced.sum()))
 
 
 def _per_instance(

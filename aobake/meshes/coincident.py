@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from aobake.tracing.compiled import inlined, kernel
 
-__all__ = ["first_equal_row"]
+__all__ = ["empty_table", "first_equal_row"]
 
 MINUS_ZERO = np.uint64(1 << 63)
 
@@ -25,9 +25,13 @@ def first_equal_row(
     count = len(columns[0])
     first = np.arange(count, dtype=np.int32)
     if count:
-        table = np.full(1 << (2 * count - 1).bit_length(), -1, np.int32)
-        _group(_as_bits(columns[0]), _as_bits(columns[-1]), table, first)
+        _group(_as_bits(columns[0]), _as_bits(columns[-1]), empty_table(count), first)
     return first
+
+
+def empty_table(count: int) -> NDArray[np.int32]:
+    """Room to find numbers below `count`, at least 1, by hashes: -1, a power of two of them, at least 2 count."""
+    return np.full(1 << (2 * count - 1).bit_length(), -1, np.int32)
 
 
 def _as_bits(column: NDArray[np.float64] | NDArray[np.uint32]) -> NDArray[Any]:

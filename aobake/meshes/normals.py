@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aobake.meshes.coincident import first_equal_row
+from aobake.meshes.coincident import empty_table
 from aobake.tracing.compiled import inlined, kernel
 from aobake.tracing.rows import largest_in_rows
 from aobake.tracing.vectors import cross, dot, largest, length, minus, row, scaled
@@ -22,6 +22,8 @@ __all__ = ["CREASE_DEGREES", "computed_normals", "unit_rows"]
 
 FloatArray = NDArray[np.float64]
 
+MIX_A, MIX_B = 0x9E3779B97F4A7C15, 0xFF51AFD7ED558CCD
+ORDINARY = 1e-70, 1e70  # sides whose fourth powers float64 can hold
 CREASE_DEGREES = 40.0  # faces at a steeper angle do not share a normal where a format has none
 
 
@@ -51,9 +53,8 @@ def computed_normals(
     of one wall would add up to nothing.
     """
     counts = _one_of_each_wall(faces)
-    sums = np.zeros((len(vertices), 3))
-    _add_own(vertices, faces, counts, sums)
-    normals = unit_rows(sums)
+    sums, normals = np.zeros((len(vertices), 3)), np.zeros((len(vertices), 3))
+    _add_own(vertices, faces, counts, sums, normals)
     if crease_degrees > 0.0 and not np.array_equal(place, np.arange(len(place))):
         start, corners = _corners_by_place(faces, place)
         cosine = math.cos(math.radians(crease_degrees))
@@ -64,11 +65,10 @@ def computed_normals(
 
 def _one_of_each_wall(faces: NDArray[np.uint32]) -> NDArray[np.bool_]:
     """(F,) False for a face that has the corners of an earlier one: its twin, or the back of its wall."""
-    a, b, c = faces.T
-    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    middle = a ^ b ^ c ^ low ^ high  # what is left; sorting rows of three takes five times as long
-    first = first_equal_row(np.stack([low, middle, high], axis=1))
-    return np.asarray(first == np.arange(len(first)), bool)
+    counts = np.ones(len(faces), bool)
+    if len(faces):
+        _pass_over_twins(faces, empty_table(len(faces)), counts)
+    return counts
 
 
 def _corners_by_place(
@@ -83,35 +83,105 @@ def _corners_by_place(
 
 @inlined
 def _sides(vertices, faces, f):
-    """Sides 0-1, 0-2 and 1-2 of a face, scaled alike so that products neither over- nor underflow."""
+    """Sides 0-1, 0-2 and 1-2 of a face, scaled alike where products of four would over- or underflow."""
     a, b, c = row(vertices, faces[f, 0]), row(vertices, faces[f, 1]), row(vertices, faces[f, 2])
     u, v, w = minus(b, a), minus(c, a), minus(c, b)
     size = max(largest(u), largest(v))
-    size = size if size > 0.0 else 1.0
+    if size == 0.0 or ORDINARY[0] < size < ORDINARY[1]:
+        return u, v, w
     return scaled(u, size), scaled(v, size), scaled(w, size)
+
+
+@inlined
+def _angle(sine, cosine):
+    """The angle in [0, pi] that a sine of at least 0 and a cosine, times the same length, belong to.
+
+    By a polynomial of the tangent or the cotangent, whichever is at most 1, without a branch, good to 1e-14 of
+    the angle. With it, no division where none is needed, and walls told without numpy, computed_normals takes
+    0.55 of the time that calls of atan2 took (70,000 faces).
+    """
+    along = abs(cosine)
+    high = max(sine, along)
+    ratio = min(sine, along) / (high if high > 0.0 else 1.0)
+    x = ratio * ratio
+    p = 7.088309024585017e-05
+    p = p * x - 6.793938680824885e-04
+    p = p * x + 3.0730775805165957e-03
+    p = p * x - 8.807589222153061e-03
+    p = p * x + 1.822022720756729e-02
+    p = p * x - 2.961082128802698e-02
+    p = p * x + 4.053370189458743e-02
+    p = p * x - 4.9788483805559e-02
+    p = p * x + 5.7945272228193595e-02
+    p = p * x - 6.646241727996893e-02
+    p = p * x + 7.688831311388786e-02
+    p = p * x - 9.090492434630482e-02
+    p = p * x + 1.1111077844931107e-01
+    p = p * x - 1.4285712660682637e-01
+    p = p * x + 1.9999999957905656e-01
+    p = p * x - 3.3333333332898407e-01
+    p = p * x + 9.999999999999925e-01
+    angle = ratio * p
+    angle = 0.5 * math.pi - angle if sine > along else angle
+    return math.pi - angle if cosine < 0.0 else angle
 
 
 @inlined
 def _front_and_angles(vertices, faces, f):
     """(unit normal, angles at the corners) of a face; zeros for one without area.
 
-    An angle is the atan2 of its sine and cosine, exact to 1e-9 for needles of 1e7. The sine times the
+    An angle is told by its sine and cosine, exact to 1e-9 for needles of 1e7. The sine times the
     sides is twice the area at every corner.
     """
     u, v, w = _sides(vertices, faces, f)
     normal = cross(u, v)
     sine = length(normal)
-    angles = (
-        np.arctan2(sine, dot(u, v)),
-        np.arctan2(sine, -dot(u, w)),
-        np.arctan2(sine, dot(v, w)),
-    )
+    angles = _angle(sine, dot(u, v)), _angle(sine, -dot(u, w)), _angle(sine, dot(v, w))
     return scaled(normal, sine if sine > 0.0 else 1.0), angles
 
 
+@inlined
+def _in_order(a, b, c):
+    """Three numbers from the least to the greatest."""
+    low, high = min(a, b, c), max(a, b, c)
+    return low, a ^ b ^ c ^ low ^ high, high
+
+
 @kernel
-def _add_own(vertices, faces, counts, sums):
-    """Add to sums (V, 3) the normals of the faces of each vertex, weighted by their angle there.
+def _pass_over_twins(faces, table, counts):
+    """Clear counts (F,) of the faces that have the corners of an earlier one.
+
+    table : of coincident.empty_table, of face numbers by a hash of their corners
+    """
+    last = np.uint64(len(table) - 1)
+    for f in range(len(faces)):
+        a, b, c = _in_order(faces[f, 0], faces[f, 1], faces[f, 2])
+        h = (np.uint64(a) * np.uint64(MIX_A)) ^ (np.uint64(b) * np.uint64(MIX_B))
+        h = (h ^ (h >> np.uint64(32)) ^ np.uint64(c)) * np.uint64(MIX_A)
+        slot = (h >> np.uint64(32)) & last
+        while table[slot] >= 0 and counts[f]:
+            g = table[slot]
+            p, q, r = _in_order(faces[g, 0], faces[g, 1], faces[g, 2])
+            counts[f] = p != a or q != b or r != c
+            slot = (slot + np.uint64(1)) & last
+        if counts[f]:
+            table[slot] = f
+
+
+@inlined
+def _set_unit(sums, normals, v):
+    """Set a row of normals to that of sums at length 1, as unit_rows does."""
+    along = row(sums, v)
+    most = largest(along)
+    along = scaled(along, most if most > 0.0 else 1.0)
+    size = length(along)
+    for i in range(3):
+        normals[v, i] = along[i] / size if size > 0.0 else 0.0
+
+
+@kernel
+def _add_own(vertices, faces, counts, sums, normals):
+    """Add to sums (V, 3) the normals of the faces of each vertex, weighted by their angle there; fill normals.
 
     Dividing it over threads with the same sums takes a second kernel, which adds up in the order of faces, and
     its compiling; of 1.3 s of a bake of 70,000 faces with 256 rays in two threads it could save 4 ms.
@@ -122,6 +192,8 @@ def _add_own(vertices, faces, counts, sums):
             for k in range(3):
                 for i in range(3):
                     sums[faces[f, k], i] += angles[k] * front[i]
+    for v in range(len(sums)):
+        _set_unit(sums, normals, v)
 
 
 @kernel

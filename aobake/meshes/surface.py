@@ -24,6 +24,8 @@ from aobake.tracing.vectors import cross, dot, largest, length, minus, row, scal
 __all__ = ["Surface", "findings", "surface_of"]
 
 FloatArray = NDArray[np.float64]
+# faces with one front, unit normals, and what was done to get them
+Oriented = tuple[NDArray[np.uint32], FloatArray, dict[FindingKind, NDArray[np.bool_]]]
 
 SAME_NORMAL = 2.0**20  # normals that agree to a millionth are one: sums differ in their last bits
 
@@ -64,12 +66,18 @@ def surface_of(mesh: Mesh, name: str = "") -> Surface:
     whole = np.ones(len(given), bool) if finite.all() else finite[given].all(axis=1)
     usable = whole & ~flat
     faces = given if usable.all() else given[usable]
-    faces, normals, found = _with_normals(mesh, clean, faces)
+    crease = 0.0 if mesh.flat_shaded else CREASE_DEGREES
+    place = None
+    if mesh.normals is not None:
+        faces, normals, found = _with_given_normals(mesh.normals, clean, faces, crease)
+    else:
+        place = first_equal_row(clean)
+        faces, normals, found = _with_computed_normals(clean, faces, place, crease)
     defined = any_in_rows(normals)
     used = np.zeros(len(vertices), bool)
     used[faces.reshape(-1)] = True
     asked = used & defined
-    same_as = _first_asked(first_equal_row(clean, np.round(normals * SAME_NORMAL)), asked)
+    same_as = _first_asked(clean, normals, asked, place)
     found |= {
         "non-finite": ~finite,
         "degenerate": whole & flat,
@@ -97,18 +105,24 @@ def findings(where: str, found: Mapping[FindingKind, NDArray[np.bool_]]) -> tupl
     return tuple(lines)
 
 
-def _with_normals(
-    mesh: Mesh, vertices: FloatArray, faces: NDArray[np.uint32]
-) -> tuple[NDArray[np.uint32], FloatArray, dict[FindingKind, NDArray[np.bool_]]]:
-    """Faces with one front, unit normals, and what was done to get them."""
-    crease = 0.0 if mesh.flat_shaded else CREASE_DEGREES
-    if mesh.normals is None:
-        place = first_equal_row(vertices)
-        turned, inward = consistent_winding(vertices, faces, place)
-        faces = _turned(faces, turned)
-        normals = computed_normals(vertices, faces, place, crease)
-        return faces, normals, {"reoriented": turned, "inward": inward}
-    normals = unit_rows(mesh.normals)
+def _with_computed_normals(
+    vertices: FloatArray, faces: NDArray[np.uint32], place: NDArray[np.int32], crease: float
+) -> Oriented:
+    """Faces with one front, and their normals.
+
+    place : (V,) int32, the first vertex at the same place
+    """
+    turned, inward = consistent_winding(vertices, faces, place)
+    faces = _turned(faces, turned)
+    normals = computed_normals(vertices, faces, place, crease)
+    return faces, normals, {"reoriented": turned, "inward": inward}
+
+
+def _with_given_normals(
+    given: FloatArray, vertices: FloatArray, faces: NDArray[np.uint32], crease: float
+) -> Oriented:
+    """Faces with their fronts where the normals of a mesh look, and these, computed where there is none."""
+    normals = unit_rows(given)
     faces = _turned(faces, _against(vertices, faces, normals))
     lacking = np.zeros(len(vertices), bool)
     lacking[faces.reshape(-1)] = True
@@ -124,13 +138,24 @@ def _turned(faces: NDArray[np.uint32], over: NDArray[np.bool_]) -> NDArray[np.ui
     return np.where(over[:, None], faces[:, [0, 2, 1]], faces) if over.any() else faces
 
 
-def _first_asked(same_as: NDArray[np.int32], asked: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Like same_as, but pointing at the first of equal vertices that is asked, where one is."""
-    best = np.full(len(same_as), len(same_as), np.int32)
-    rows = np.arange(len(same_as), dtype=np.int32)
+def _first_asked(
+    vertices: FloatArray,
+    normals: FloatArray,
+    asked: NDArray[np.bool_],
+    place: NDArray[np.int32] | None,
+) -> NDArray[np.int32]:
+    """(V,) the first vertex that is asked of those with the same place and normal; itself where none is.
+
+    place : the first vertex at the same place, where that is known
+    """
+    rows = np.arange(len(vertices), dtype=np.int32)
+    if place is not None and np.array_equal(place, rows):
+        return rows
+    same_as = first_equal_row(vertices, np.round(normals * SAME_NORMAL))
+    best = np.full(len(rows), len(rows), np.int32)
     np.minimum.at(best, same_as[asked], rows[asked])
     best = best[same_as]
-    return np.where(asked & (best < len(same_as)), best, rows)
+    return np.where(asked & (best < len(rows)), best, rows)
 
 
 def _against(

@@ -138,3 +138,19 @@ def test_what_has_no_direction_comes_out_as_zero() -> None:
     assert not unit_rows(vectors).any()
     assert unit_rows(np.zeros((0, 3))).shape == (0, 3)
     assert unit_rows(np.array([unit((1, 2, 2))])).tolist() == [unit((1, 2, 2)).tolist()]
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-100, 1e-60, 1e60, 1e100, 1e300])
+def test_normals_are_the_same_at_any_size(scale: float) -> None:
+    mesh = box()
+    sized = Triangles(scale * mesh.vertices, mesh.faces)
+    assert np.allclose(normals_of(sized), normals_of(mesh), atol=1e-12)
+
+
+def test_weights_are_angles_to_the_last_digits() -> None:
+    """Two faces at a vertex, of which one has any angle and the other a right one."""
+    for angle in [1e-9, 1e-3, 0.3, np.pi / 4, 1.0, np.pi / 2, 2.0, 3.0, np.pi - 1e-6]:
+        tip = (np.cos(angle), np.sin(angle), 0.0)
+        vertices = np.array([(0, 0, 0), (1, 0, 0), tip, (0, 0, 1)], np.float64)
+        found = normals_of(Triangles(vertices, np.array([(0, 1, 2), (0, 3, 1)], np.int32)))[0]
+        assert math.atan2(found[2], found[1]) == pytest.approx(math.atan2(angle, np.pi / 2), 1e-13)
