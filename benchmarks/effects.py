@@ -41,6 +41,7 @@ from aobake.tracing.compiled import kernel
 from aobake.tracing.foreign import call_packet
 from aobake.tracing.lanes import ALL, below, count, eight, put_mask, spread
 from aobake.tracing.sampling import direction_sets
+from aobake.tracing.sized_sets import SizedSets
 
 FAR = 1e3  # beyond all that is in a scene
 POINTS = 2000  # of the comparison of kernels, which takes one thread
@@ -85,12 +86,13 @@ def cost_of_nothing(scene: Scene, rays: int, repeats: int) -> list[float]:
     normals, numbers = points.normals.astype(np.float32), points.numbers
     functions, tree = embree.packets(lanes=8), prepared.world.tree.address
     sets, seed = direction_sets(rays), np.uint64(0)
+    sized, sizes = SizedSets.of({rays: sets}), np.zeros(len(origins), np.int64)
     memory, sums = kernels.scratch(), np.empty((len(origins), kernels.SUMS))
 
     def whole() -> None:
         kernels.trace(
             functions, tree, origins, normals, None, numbers,
-            seed, sets, rays, np.float32(np.inf), None, None, memory, sums, None, None,
+            seed, sized, sizes, np.float32(np.inf), None, None, memory, sums, None, None,
         )  # fmt: skip
 
     def plain() -> None:

@@ -19,6 +19,7 @@ from aobake.tracing import embree
 from aobake.tracing.conditioning import UnitFrame
 from aobake.tracing.kernels import SUMS, scratch, trace
 from aobake.tracing.sampling import direction_sets
+from aobake.tracing.sized_sets import SizedSets
 
 __all__ = ["Ground", "across", "ground_of", "openness"]
 
@@ -84,6 +85,7 @@ def _traced(tree: embree.Tree, points: FloatArray, axis: int, threads: int) -> F
     up = np.zeros((ROWS_AT_ONCE * count, 3), np.float32)
     up[:, axis] = 1.0
     result = np.empty((count, count), np.float32)
+    sets = SizedSets.of({RAYS: direction_sets(RAYS)})
 
     def rows(first: int) -> None:
         part = points[first : first + ROWS_AT_ONCE].reshape(-1, 3).astype(np.float32)
@@ -96,8 +98,8 @@ def _traced(tree: embree.Tree, points: FloatArray, axis: int, threads: int) -> F
             None,
             np.arange(len(part)) + first * count,
             np.uint64(0),
-            direction_sets(RAYS),
-            RAYS,
+            sets,
+            np.zeros(len(part), np.int64),
             np.float32(np.inf),
             None,
             None,

@@ -2,6 +2,8 @@
 
 All of it happens in float64, before anything is rounded. What is left of the rounding is then a few
 ulps of the distance from the middle of what is looked at, whatever the scene's own units and place.
+
+The kernels are not 1 % of any bake measured: written plainly.
 """
 
 from __future__ import annotations

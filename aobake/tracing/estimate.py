@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -32,6 +32,7 @@ from aobake.tracing.origins import ENCLOSED, OPEN, PLAIN, place_origins
 from aobake.tracing.origins import scratch as origins_scratch
 from aobake.tracing.rounds import PILOT, STRIDE, missing
 from aobake.tracing.sampling import direction_sets
+from aobake.tracing.sized_sets import SizedSets
 from aobake.tracing.tally import Tally
 from aobake.tracing.world import World
 
@@ -43,7 +44,6 @@ Progress = Callable[[int, int], None]
 
 COUNTED = 2  # the column of the rays that count, of what trace adds up
 USUAL = 5  # rounds towards a tolerance
-SIZES_IN_BLOCK = 4  # of sets: a block is so much larger, since each of them is a call of its own
 ODD = 0x9E3779B97F4A7C15  # between the seeds of a point's sets
 SEEDS = 1 << 64
 # Rays of a point, squared, for each triangle, from which on neighbouring rays meet much the same boxes of the tree:
@@ -181,8 +181,11 @@ class Work:
         seen = along(self.order, np.flatnonzero(_wants_rays(self.states)))
         return Neighbours.along(seen, self.request.normals[seen])
 
-    def sets(self, rays: int) -> NDArray[np.float32]:
-        """Directions for so many rays of a point."""
+    def sets(self, sizes: Iterable[int]) -> SizedSets:
+        """Directions for so many rays of a point, rising."""
+        return SizedSets.of({rays: self._sets(rays) for rays in sizes})
+
+    def _sets(self, rays: int) -> NDArray[np.float32]:
         if self.request.sets is not None:
             return self.request.sets
         return lobed(direction_sets(rays), self.settings.distribution, self.settings.spread)
@@ -196,7 +199,7 @@ def compile_kernels(world: World, request: Request, settings: TraceSettings) -> 
     """
     none = np.zeros(0, np.int64)
     nothing = Work.planned(world, request.only(none), settings)
-    _trace(nothing, none, direction_sets(1), 1)
+    _trace(nothing, none, nothing.sets([1]), none)
     _place(nothing, none)
 
 
@@ -226,13 +229,14 @@ def _first_pass(work: Work, over_blocks: Callable[..., None], progress: Progress
     """Origins of all points, and their rays: all of them, or towards a tolerance a few of those that lead."""
     count, fixed = len(work.origins), work.settings.tolerance is None
     rays = work.settings.rays if fixed else PILOT
-    sets = work.sets(rays)
+    sets = work.sets([rays])
     first = np.ones(count, bool) if fixed else work.leading()
 
     def begin(block: IntArray) -> None:
         _place(work, block)
         chosen = block[first[block] & _wants_rays(work.states[block])]
-        work.tally.add(chosen, _trace(work, chosen, sets, rays), rays)
+        each = np.full(len(chosen), rays)
+        work.tally.add(chosen, _trace(work, chosen, sets, each), each)
 
     report = None
     if progress is not None:
@@ -270,18 +274,15 @@ def _next_sets(
     going = np.flatnonzero(sizes)
     wanted = np.zeros(len(work.origins), np.int64)
     wanted[points] = sizes
-    sets = {size: work.sets(size) for size in set(sizes[going].tolist())}
+    if len(going) == 0:
+        return
+    sets = work.sets(np.unique(sizes[going]).tolist())
 
     def go_on(block: IntArray) -> None:
-        of, sums = wanted[block], np.empty((len(block), SUMS))
-        for size in np.unique(of).tolist():
-            alike = of == size
-            sums[alike] = _trace(work, block[alike], sets[size], size, number)
-        work.tally.add(block, sums, of)
+        each = wanted[block]
+        work.tally.add(block, _trace(work, block, sets, each, number), each)
 
-    if len(going):
-        rays = int(sizes.sum()) / len(going)
-        over_blocks(go_on, points[going], max(1, round(rays / SIZES_IN_BLOCK)))
+    over_blocks(go_on, points[going], max(1, round(int(sizes.sum()) / len(going))))
 
 
 def _still(progress: Progress, settled: int, count: int, _: int) -> None:
@@ -322,10 +323,11 @@ def _wants_rays(states: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
 
 def _trace(
-    work: Work, chosen: IntArray, sets: NDArray[np.float32], rays: int, number: int = 0
+    work: Work, chosen: IntArray, sets: SizedSets, rays: IntArray, number: int = 0
 ) -> FloatArray:
-    """(len(chosen), SUMS) what kernels.trace adds up over the same number of rays from each of the chosen points.
+    """(len(chosen), SUMS) what kernels.trace adds up over the rays from each of the chosen points.
 
+    rays : (len(chosen),) how many, each the size of some of the sets
     number : of the set, among those of a point
     """
     settings, request = work.settings, work.request
@@ -338,8 +340,9 @@ def _trace(
     falloff = {"none": None, "linear": LINEAR, "smooth": SMOOTH}[settings.falloff]
     far = np.inf if settings.max_distance is None else settings.max_distance * scale
     plain = falloff is None and request.reach is None and not work.world.filtered
+    mean = rays.sum() / max(len(rays), 1)
     trace(
-        embree.packets(coherent=plain and rays * rays >= COHERENT * work.world.triangles),
+        embree.packets(coherent=plain and bool(mean**2 >= COHERENT * work.world.triangles)),
         work.world.tree.address,
         at,
         request.normals[chosen].astype(np.float32),
@@ -347,7 +350,7 @@ def _trace(
         request.numbers[chosen],
         np.uint64((settings.seed + number * ODD) % SEEDS),
         sets,
-        rays,
+        sets.of_each(rays),
         np.float32(far),
         _ground(work, at),
         falloff,

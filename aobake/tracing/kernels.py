@@ -272,7 +272,7 @@ def trace(
     numbers,
     seed,
     sets,
-    rays,
+    sizes,
     far,
     ground,
     falloff,
@@ -281,14 +281,15 @@ def trace(
     open_directions,
     distances,
 ):
-    """Trace `rays` directions from each point and add up how open they are.
+    """Trace a set of directions from each point and add up how open they are.
 
     functions : of embree.packets
     scene : address of the tree
     origins, normals : (P, 3) float32; normals of any length above 0
     geometric : (P, 3) float32, directions below it do not count; or None
     numbers : (P,) int64, what makes a point's directions its own, together with the seed
-    sets : (SETS, packets, 3, 8) float32 of sampling.direction_sets(rays)
+    sets : of sized_sets.SizedSets
+    sizes : (P,) int64, rows of the table: how large each point's set is
     far : float32, where rays end; may be infinite
     ground : (axis, (P,) float32 heights of the origins above it), or None
     falloff : LINEAR or SMOOTH, for which the nearest hit is looked for; None: any hit closes a ray
@@ -301,6 +302,7 @@ def trace(
     """
     packet, words, valid, counts, frame = scratch
     any_hit, nearest_hit, lanes, asked = functions
+    directions, table = sets.directions, sets.table
     halves = lanes // 8
     for half in range(halves):
         ready(packet, words, lanes, 8 * half)
@@ -310,7 +312,10 @@ def trace(
         turned_frame(normals[point], bits, frame)
         for half in range(halves):
             set_out(packet, origins[point], lanes, 8 * half)
-        chosen = sets[np.int64(bits & np.uint64(len(sets) - 1))]
+        size = sizes[point]
+        rays, length = table[size, 0], table[size, 1]
+        begin = table[size, 2] + np.int64(bits & np.uint64(table[size, 3] - 1)) * length
+        chosen = directions[begin : begin + length]
         total, rough, counted = 0.0, 0.0, 0
         apart, whole = 0.0, 0
         before = -1.0

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aobake.tracing.planning_kernels import rates
 from aobake.tracing.tally import Behind, Tally
 
 __all__ = ["Neighbours"]
@@ -76,16 +77,6 @@ class Neighbours:
         prior : how much of the whole the rate over all points counts as
         """
         overall = float(part.sum()) / max(float(whole.sum()), 1.0)
-        beside = self._sum(whole) + prior
-        there = (self._sum(part) + prior * overall) / beside
-        share = np.where(whole > 0.0, np.minimum(whole, beside), 1.0)
-        return np.asarray((part + share * there) / (whole + share))
-
-    def _sum(self, values: FloatArray) -> FloatArray:
-        """(P,) the weighted sum of the neighbours' values."""
-        found = np.zeros(len(values))
-        for row, step in zip(self.weights, range(1, len(values)), strict=False):
-            weights = row[:-step]
-            found[:-step] += weights * values[step:]
-            found[step:] += weights * values[:-step]
+        found = np.empty(len(part))
+        rates(self.weights, part, whole, prior, overall, found)
         return found

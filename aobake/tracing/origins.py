@@ -15,6 +15,9 @@ ulps of the point are looked up, and the origin is put
 The error bounds follow T. Ize, Robust BVH ray traversal, JCGT 2(2), 2013 (relative error of a float32
 edge and plane test, here at most 4 x 2^-24), and C. Waechter, N. Binder, A fast and robust method for
 avoiding self-intersection, Ray Tracing Gems, 2019 (offsets in ulps along the geometric normal).
+
+place_origins takes 3 % of a vertex bake of a scan at 256 rays, 11 % of one of a small house at 64. What was
+tried stands in contacts.py and docs/performance.md.
 """
 
 from __future__ import annotations

