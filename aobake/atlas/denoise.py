@@ -15,6 +15,18 @@ What was measured, as root mean square errors of a page of 66 charts on a bumpy 
 
 The last four are of the whole page at once. Twice the rays gain more than the large network does in the
 same time.
+
+What the network would change is noise and detail together. Its square is what it takes away of noise and what it
+spoils, and the noise is known: so around each texel it counts by the share that is noise (C. Stein, 1956). The
+error against that of as many rays without denoising, on 192 x 192 texels of 64 and of 256 rays:
+
+                                 demo hall       a house         a figure        a scan          a soft body
+    within two standard errors   0.955  1.123    1.136  1.281    1.022  1.248    0.768  1.000    0.572  0.787
+    within one                   0.924  1.018    1.002  1.072    0.917  1.039    0.777  0.967    0.609  0.797
+    the share of each chart      0.930  1.005    0.983  1.017    0.931  0.995    0.768  1.000    0.572  0.787
+    of 17 x 17 texels            0.929  1.005    0.974  1.016    0.915  0.990    0.768  0.996    0.572  0.787
+    of 9 x 9 texels              0.925  1.001    0.966  1.010    0.901  0.975    0.768  0.989    0.572  0.787
+    of 5 x 5 texels              0.923  0.996    0.956  1.001    0.884  0.961    0.768  0.984    0.572  0.787    this
 """
 
 from __future__ import annotations
@@ -48,6 +60,8 @@ CONTEXT = 64  # both are whole in the network's coarsest texels, 16 wide, and wh
 FEWEST_TEXELS = 64  # a chart as small as 8 x 8 has nothing to smooth
 MOST_ERRORS = 2.0  # standard errors by which a value is moved at most
 SAME = 2  # texels around one that has their very value: there is no noise to take away
+AROUND = 2  # texels around one, over which what is changed is compared with the noise
+TINY = 1e-30  # nothing has changed
 
 
 def available() -> bool:
@@ -76,7 +90,8 @@ def denoised(
     normal : (H, W, 3) float32 unit vectors, which guide the filter; or None
     threads : None: one per processor
     Returns (H, W) float32. No value moves by more than twice its standard error, so that a converged page
-    stays as it is. Charts of a few texels stay as well, and values that all their neighbours share.
+    stays as it is, nor by more than noise explains around it. Charts of a few texels stay as well, and values
+    that all their neighbours share.
     Raises EngineError where Open Image Denoise is missing or refuses its work.
     Source: the "RT" filter of Open Image Denoise 2 (A. Afra), for values in [0, 1] and guides without noise.
     """
@@ -91,9 +106,8 @@ def denoised(
             nearest = nearest_covered(own, sum(own.shape))
             noisy = _cut(values, window, 0).reshape(-1)[nearest]
             guide = None if normal is None else _cut(normal, window, 0).reshape(-1, 3)[nearest]
-            most = MOST_ERRORS * _cut(error, window, 0)
-            most[_uniform(noisy)] = 0.0
-            moved = noisy + np.clip(_smooth(device, noisy, guide) - noisy, -most, most)
+            noise = np.where(own & ~_uniform(noisy), _cut(error, window, 0), np.float32(0.0))
+            moved = noisy + _explained(_smooth(device, noisy, guide) - noisy, noise)
             result[core][mine] = moved[inner][mine]
     return result
 
@@ -138,6 +152,22 @@ def _within(inner: Box, outer: Box) -> Box:
         for part, around in zip(inner, outer, strict=True)
     )
     return rows, columns
+
+
+def _explained(change: Float32Array, noise: Float32Array) -> Float32Array:
+    """(H, W) the part of a change that noise explains. noise : standard errors, 0 where nothing is to change."""
+    change = np.where(noise > 0.0, change, np.float32(0.0))
+    share = _around(np.square(noise)) / np.maximum(_around(np.square(change)), TINY)
+    most = MOST_ERRORS * noise
+    return np.asarray(np.clip(change * np.minimum(share, 1.0), -most, most), np.float32)
+
+
+def _around(image: Float32Array) -> NDArray[np.float64]:
+    """(H, W) sums over the texels around each."""
+    sums = np.pad(image.astype(np.float64), AROUND)
+    for axis in (0, 1):
+        sums = np.lib.stride_tricks.sliding_window_view(sums, 2 * AROUND + 1, axis).sum(axis=-1)
+    return np.asarray(sums)
 
 
 def _uniform(image: Float32Array) -> NDArray[np.bool_]:

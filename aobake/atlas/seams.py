@@ -7,6 +7,23 @@ that a bilinear lookup reads there are moved so that both lookups agree, as litt
             + STAY sum over texels ((value - baked value) / error)^2      errors relative to the middle one
 
 Source: M. Iwanicki, Lighting technology of The Last of Us, SIGGRAPH talks, 2013.
+
+What was measured at 192 x 192 texels of 64 rays: the root mean square error of texels over that before, and of
+the steps that are left where the surface has none above 0.05; 16 samples in each texel are the truth.
+
+                                              demo hall        a house          a scan
+    as traced                                 1      0.0246    1      0.0194    1      0.0186
+    real step 0.1 + 4 errors, STAY 0.01       1.265  0.0086    1.053  0.0084    0.983  0.0010
+    0.1 + 2 errors, STAY 0.1                  1.109  0.0089    1.017  0.0078    0.975  0.0019
+    and no error below that of the width      1.100  0.0088    1.014  0.0076    0.971  0.0019
+    0.05 + 2 errors                           1.047  0.0090    1.005  0.0079    0.971  0.0019
+    0.05 + 2.5 errors                         1.057  0.0087    1.008  0.0077    0.971  0.0019    this one
+    0.03 + 2 errors                           1.026  0.0107    1.002  0.0085    0.970  0.0021
+    1/256 + 4 errors, STAY 0.01               1.080  0.0113    1.011  0.0103    0.982  0.0012
+    0.05 + 2 errors, STAY 0.3                 1.032  0.0100    1.002  0.0082    0.972  0.0030
+
+A limit by the range of the texels that are read, on either side or on both, told true steps no better (1.176), and
+neither did one place per texel (1.042 and 0.0116 in the hall).
 """
 
 from __future__ import annotations
@@ -31,10 +48,10 @@ CREASE = math.cos(
     math.radians(2.0)
 )  # normals farther apart see different hemispheres: a step is right there
 PLACES_PER_TEXEL = 2
-REAL_STEP = 0.1  # two sides that differ by more, and by more than noise, do so on the surface, too
-SURE = 4.0  # standard errors
-STAY = 0.01  # the step that is left is about this share of what it was
-LEAST_ERROR = 0.1  # of the middle one, lest a texel be nailed down
+REAL_STEP = 0.05  # two sides that differ by more, and by more than noise, do so on the surface, too
+SURE = 2.5  # standard errors
+STAY = 0.1  # the step that is left is about this share of what it was
+WIDTH_ERROR = 0.01  # what is off since a texel stands for all of its width, however many its rays
 MOST_ROUNDS = 200
 GOOD_ENOUGH = 1e-3  # of the first residual; a hundredth of that changes no step by more than 2e-4
 
@@ -174,11 +191,8 @@ def _places(ends: FloatArray) -> FloatArray:
 
 def _stiffness(error: Float32Array) -> FloatArray:
     """What it costs to move each texel."""
-    middle = float(np.median(error))
-    if not middle > 0.0:
-        return np.full(len(error), STAY)
-    relative = np.maximum(error.astype(np.float64) / middle, LEAST_ERROR)
-    return np.asarray(STAY / np.square(relative))
+    variance = np.square(error, dtype=np.float64) + WIDTH_ERROR**2
+    return np.asarray(STAY * np.median(variance) / variance)
 
 
 def _least_change(

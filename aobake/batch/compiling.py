@@ -18,7 +18,7 @@ CHOOSING = (
     "tolerance", "tolerance_of", "max_distance", "falloff", "backfaces", "ground", "distribution", "spread",
     "bent_normals", "mean_distance", "method", "supersample", "denoise", "bent_space",
 )  # fmt: skip
-RAYS, TEXELS = 32, 32
+RAYS, TEXELS = 32, 96  # charts of fewer texels would not be denoised
 
 
 def compile_for(task: Task) -> None:

@@ -22,6 +22,7 @@ from aobake.meshes.surfaces import surfaces_of
 from aobake.occlusion import compile_for
 from aobake.open_sky import sky_over
 from aobake.plan import texture_plan
+from aobake.planning.denoising import denoised_where_it_pays
 from aobake.points import points_on_faces, vertex_points
 from aobake.prepare import Prepared, build, in_scene_units, lowest, refuse
 from aobake.results import BakedTexture
@@ -79,6 +80,7 @@ def prepare_texture(
         if layout is None:
             unwrapping = None if progress is None else partial(progress, "unwrap")
             layout = lay_out(scene, prepared, settings, settings.threads, unwrapping)
+    plan = denoised_where_it_pays(plan, layout, settings)
     ground = lowest(scene, prepared, settings)
     with timed(seconds, "build"):
         samples = len(layout.pages) * (settings.size * settings.supersample) ** 2

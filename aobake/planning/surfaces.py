@@ -81,7 +81,8 @@ def _blend(scene: Scene, settings: BakeSettings) -> Effect:
 def _denoise(settings: BakeSettings) -> Effect:
     """On where it is asked for, or where noise would show and the denoiser is there.
 
-    Half the error by rays costs 2.5 times their seconds; the denoiser costs what 50 rays a texel do.
+    Half the error by rays costs 2.5 times their seconds; on large charts the denoiser costs what 60 rays a texel do.
+    Where charts turn out to be small, a bake leaves it off after all (planning.denoising).
     """
     from aobake.atlas.denoise import available  # heavy: vertices do without
 
@@ -93,5 +94,7 @@ def _denoise(settings: BakeSettings) -> Effect:
     if not available():
         return Effect(False, "It would pay, but pyoidn is not installed (aobake[denoise]).")
     return Effect(
-        True, f"A standard error of about {expected:.4f} costs less to smooth than to trace.", 1.2
+        True,
+        f"A standard error of about {expected:.4f} costs less to smooth than to trace, on large charts.",
+        1.2,
     )

@@ -10,6 +10,7 @@ import numpy as np
 from aobake.atlas.layout import intended
 from aobake.atlas.unwrap import unwrap
 from aobake.meshes.scene import Mesh, Scene
+from aobake.planning.denoising import LEAST_CHART
 from aobake.planning.effect import Plan
 from aobake.prepare import Prepared
 from aobake.settings import BakeSettings
@@ -53,8 +54,9 @@ def texture_cost(
     texels = layout.pages * settings.size**2
     samples = texels * settings.supersample**2
     stages["texels"], stages["finish"] = SAMPLED_S * samples, FILLED_S * texels
-    if decided.effects["denoise"].on:
-        count = charts if meshes else KEPT_CHARTS * layout.pages
+    count = charts if meshes else KEPT_CHARTS * layout.pages
+    small = FILLED * texels < LEAST_CHART * count
+    if decided.effects["denoise"].on and not (settings.denoise == "auto" and small):
         stages["denoise"] = _denoising(FILLED * texels, count, settings.threads)
     return TextureCost(points=round(FILLED * samples), stages=stages)
 

@@ -107,6 +107,14 @@ def test_a_page_of_one_value_stays_though_its_error_is_not_zero(value: float) ->
 
 
 @needs_oidn
+def test_detail_that_noise_does_not_explain_stays() -> None:
+    """White detail of 0.1 whose error is a tenth of that: the network would take all of it away."""
+    detail = noisy(0.1)
+    moved = denoised(detail, errors(0.01), two_charts(), FLAT) - detail
+    assert rms(moved) < 0.3 * 0.01
+
+
+@needs_oidn
 def test_what_is_no_chart_stays_and_so_do_tiny_charts() -> None:
     page, chart = noisy(0.03), np.full((SIZE, SIZE), -1, np.int32)
     chart[10:17, 10:17] = 0

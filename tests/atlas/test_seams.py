@@ -126,7 +126,7 @@ def test_the_noisier_side_moves() -> None:
         smooth=np.array([True]),
     )
     page = np.array([[0.3, 0.4], [0.3, 0.4]], np.float32)
-    sure = np.array([[0.001, 0.01], [0.001, 0.01]], np.float32)
+    sure = np.array([[0.01, 0.1], [0.01, 0.1]], np.float32)
     after = equalised(page, sure, np.ones((2, 2), bool), seams)
     assert after[0, 1] == pytest.approx(after[0, 0], abs=0.01)
     assert abs(after[0, 0] - 0.3) < 0.01
@@ -142,6 +142,31 @@ def test_a_step_that_no_noise_explains_stays(error: float, moves: bool) -> None:
     page = np.array([[0.0, 0.9], [0.0, 0.9]], np.float32)
     after = equalised(page, np.full_like(page, error), np.ones((2, 2), bool), seams)
     assert bool((after != page).any()) == moves
+
+
+def test_beside_a_small_true_step_both_sides_keep_their_values() -> None:
+    """Something stands on a seam: one side of it is darker, by many times the noise of either."""
+    patches = patched(cylinder, rows=1, columns=4, size=256, padding=8)
+    truth, noise = np.where(patches.chart % 2 == 0, 0.35, 0.42), 0.001
+    rng = np.random.default_rng(3)
+    page = (truth + rng.normal(0.0, noise, truth.shape)).astype(np.float32)
+    after = equalised(page, np.full_like(page, noise), patches.chart >= 0, seams_of(patches))
+    assert np.abs(after - page).max() < 0.005
+
+
+def test_a_page_of_few_rays_gets_no_worse() -> None:
+    """What noise explains is closed, and that takes noise away on both sides."""
+    patches = patched(sphere, rows=4, columns=8, size=256, padding=8)
+    seams, covered = seams_of(patches), patches.chart >= 0
+    truth = shading(patches, 0.0)[0]
+    values, error = shading(patches, 0.05)
+    after = equalised(values, error, covered, seams)
+    moved = covered & (after != values)
+    assert rms(after - truth, moved) < 0.9 * rms(values - truth, moved)
+
+
+def rms(difference: Float32Array, chosen: NDArray[np.bool_]) -> float:
+    return float(np.sqrt(np.mean(np.square(difference[chosen], dtype=np.float64))))
 
 
 def test_values_stay_in_range() -> None:
