@@ -17,7 +17,7 @@ from aobake import (
     images,
 )
 from aobake.atlas.lookup import sample
-from aobake.lightmaps import bands
+from aobake.lightmaps import bands, samples
 from aobake.meshes.scene import Attribute, Image, Texture
 from tests.scenes import FloatArray, Triangles, affine, box, icosphere, mesh_of, moved, patch
 
@@ -110,6 +110,21 @@ def test_bands_and_threads_do_not_change_a_byte(
     assert cut.image.tobytes() == whole.image.tobytes()
     assert cut.standard_errors[0].tobytes() == whole.standard_errors[0].tobytes()
     assert cut.rays == whole.rays
+
+
+@pytest.mark.parametrize("supersample", [1, 2])
+def test_the_tiles_that_texels_are_traced_in_do_not_change_a_byte(
+    supersample: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = beside(on_its_own_square(SQUARE), moved(CUBE, shift=(0.0, 0.0, 0.4)))
+    tiled = baked(scene, supersample=supersample, bent_normals=True)
+    monkeypatch.setattr(samples, "TILE_PX", 1 << 15)
+    by_row = baked(scene, supersample=supersample, bent_normals=True)
+    assert tiled.image.tobytes() == by_row.image.tobytes()
+    assert tiled.standard_errors[0].tobytes() == by_row.standard_errors[0].tobytes()
+    assert tiled.bent_normals is not None
+    assert by_row.bent_normals is not None
+    assert tiled.bent_normals[0].tobytes() == by_row.bent_normals[0].tobytes()
 
 
 def test_four_samples_a_texel_halve_the_error() -> None:

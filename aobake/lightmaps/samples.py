@@ -1,4 +1,13 @@
-"""Samples of texels: where they lie on the instances of a page, and what is traced there."""
+"""Samples of texels: where they lie on the instances of a page, and what is traced there.
+
+One sample a texel is the better use of rays, even where the mean over a texel is asked for: each sample has directions
+of its own, which do not complete those of the others. Root mean square errors on a page of 384, a scan of 70,000
+triangles, to middles / means of texels, which differ by 0.0041:
+
+    rays of a texel     64               128              256
+    one sample          0.0134, 0.0139   0.0081, 0.0088   0.0049, 0.0060
+    2 x 2 samples       0.0221, 0.0220   0.0133, 0.0132   0.0082, 0.0080
+"""
 
 from __future__ import annotations
 
@@ -26,6 +35,10 @@ Report = Callable[[float], None]
 
 MOST_TURNS = 64  # instances that are stored together, of which one texel takes its mean
 LEAST_RAYS = 4  # for each of them
+# Processor time of tracing texels tile by tile / row by row, a scan of 70,000 triangles on a page of 1024, 16 rays:
+# 8 texels wide 0.925, 16 0.926, 32 0.917, 64 0.928; along a Morton curve of the page 0.927, in space 0.922. Of the
+# whole bake 0.95 at 64 rays, 0.92 at a tolerance of rms:0.01 on a page of 512; of the demo hall, 512, 32 rays, 0.97.
+TILE_PX = 32
 SLIGHTLY = 1e-6  # what the direction of a sample counts that nothing is open at: if no other does
 
 
@@ -84,11 +97,19 @@ def sampled(page: OpenPage, found: Texels, counts: Counts, report: Report) -> Sa
     numbers = _numbers(found.pixel, page.first, page.bake.settings.supersample)
     turns = [min(len(several), MOST_TURNS) for several in page.members]
     turn = np.array(turns, np.int64)[found.owner]
+    order = _tile_by_tile(found.pixel, page.bake.settings.size)
     for count in np.unique(turn).tolist():
-        chosen = np.flatnonzero(turn == count)
+        chosen = order[turn[order] == count]
         part = _part_of(report, float(np.mean(turn < count)), len(chosen) / len(turn))
         samples.put(chosen, _mean_over(page, found, chosen, numbers[chosen], count, counts, part))
     return samples
+
+
+def _tile_by_tile(pixel: NDArray[np.int64], width: int) -> NDArray[np.int64]:
+    """(T,) the order to trace samples of a band in, one tile after another, row by row within each."""
+    row, column = np.divmod(pixel, width)
+    tile = (row - row[0]) // TILE_PX * -(-width // TILE_PX) + column // TILE_PX
+    return np.argsort(tile.astype(np.uint16), kind="stable")  # numpy sorts short numbers by radix
 
 
 def _mean_over(
