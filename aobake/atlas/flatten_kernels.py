@@ -6,6 +6,14 @@ weighted mean of its neighbours, which no triangle survives flipped. From there 
 energy (J. Smith, S. Schaefer, Bijective parameterization with free boundaries, 2015) is lowered by
 L-BFGS steps that the surface's Laplacian preconditions (Y. Zhu, R. Bridson, D. Kaufman, Blended cured
 quasi-Newton for distortion optimization, 2018), never so far that a triangle flips.
+
+Approaches tried, on 20,020 faces of a scan in 10 calls, as processor seconds beside the kernel as it is:
+equations of a step without the look at fixed rows 1.02, the same bytes; their vectors in float32 1.21; a
+history of 12 steps 1.06, of 3 0.78 with more stretch (a mean of 1.031 instead of 1.019); Tutte's
+equations to 1e-4 1.11, to 1e-6 0.96; those of a step to 1e-3 1.68, to 1e-1 0.38 (1.029). To 1e-1 and SETTLED at
+0.001, whole unwrappings of a scan of 69,000 triangles and a mesh of 130,000 spend 0.47 and 0.62 of the seconds
+in this kernel (one run of each), but the page of the scan was covered to 0.40 instead of 0.55: left, until it
+is known whether that is chance. Stretch moves by 0.002 where only rounding differs.
 """
 
 from __future__ import annotations

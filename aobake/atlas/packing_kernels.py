@@ -3,6 +3,12 @@
 The page is a grid of cells, in which every row knows, for every column, where the next occupied and the
 next free cell are. A row of a chart that does not fit so says at once how far it has to move, and a whole
 row of places is passed in a few jumps.
+
+Approaches tried on place_charts, 53 charts of a scan on a page of 1,024 at three scales, of which one fits, as
+processor seconds beside it as it is, with the same places: without each row's longest gap 1.04; without it and
+with the spans from the top, instead of the longest one first, 1.08; without beginning at the span that met
+something 1.03; jumps of 32 bits instead of 16 1.15; each chart looked for from the top of the page 2.17. Two
+turns instead of four take 0.69 and put charts elsewhere; left, since how full pages get so is not measured.
 """
 
 from __future__ import annotations

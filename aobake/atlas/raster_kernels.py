@@ -1,6 +1,11 @@
 """Which triangle each sample of a page is nearest to, and which point of it.
 
 Within the kernels, coordinates are in samples, with the centres of samples at whole numbers.
+
+Tried on cover, 69,168 triangles of a scan on a page of 1,024 in four parts, twice: every triangle compared
+where one covers a sample already 1.55, with the same result; the columns of a triangle's box in every row 0.87,
+but it lets in triangles that the square around a sample does not meet. locate is not 1 % of any bake measured:
+written plainly.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 A half-edge 3 f + k runs from corner k of face f to the next one; `across` holds the half-edge on its other
 side, or -1 at a border. Vertices are what corners are glued to across half-edges, so that a piece that
 touches itself in a point is a surface all the same, and a cut is an entry of -1.
+
+connected is not 1 % of any bake measured: written plainly. The others are part of flatten_pieces.
 """
 
 from __future__ import annotations

@@ -2,6 +2,9 @@
 
 A status is 0 for a whole stream, else one of the constants of meshopt_kernels.
 Source: KHR_meshopt_compression, appendix A, modes 1 and 2, by A. Kapoulkine and others.
+
+Tried: recent edges and vertices in 32 bits instead of 64, 0.88 of the processor seconds of triangles. Not taken
+up yet: the kernel takes 1 and 5 % of reading two small models, at 300 to 420 MB/s.
 """
 
 from __future__ import annotations

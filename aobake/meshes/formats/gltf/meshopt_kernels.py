@@ -2,6 +2,10 @@
 
 A status is 0 for a whole stream, else one of the constants below.
 Source: KHR_meshopt_compression, appendix A, mode 0, by A. Kapoulkine and others.
+
+Tried: one element after the other and its four bytes within, instead of one byte of all elements after the
+other, 1.06 of the processor seconds (vertex streams of two small models). The kernel takes 6 and 13 % of
+reading them, at 80 to 100 MB/s of what comes out.
 """
 
 from __future__ import annotations
