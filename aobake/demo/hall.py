@@ -83,7 +83,7 @@ def _ground() -> list[Part]:
     bed = stone((8.0, 0.48, 6.6), 0.02, 0.16, bedded=True)
     border = (4.0005, 3.9)
     ground = surround(border, 6.1, 0.25, 0.16)
-    footing = frame(border, 0.1)  # or one would look through the joint
+    footing = frame(border, 0.4)  # or one would look through the joint and below the rounded stones
     steps = []
     for number, name in enumerate(("upper step", "middle step", "lower step")):
         height = 0.22 * (3 - number)
