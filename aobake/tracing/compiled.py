@@ -5,8 +5,9 @@ and the kinds of its arguments. Only where it is not there, numba is imported an
 which is loaded from memory as it is from disk (machine.py): a bake whose kernels are kept never imports numba.
 
 What made compiling short, in seconds of a vertex bake's 24: no wrappers for Python and C around functions that only
-kernels call, 4; no np.zeros and np.argsort in kernels, 7; making code fast once (translate.hurry), 1. Tried and
-left: merging small functions before they are typed (numba's inline="always") took four times as long for
+kernels call, 4; no np.zeros and np.argsort in kernels, 7; and a quarter of what was left since code is linked and
+made fast once (gathering.py). Tried and left: merging small functions before they are typed (numba's
+inline="always") took four times as long for
 place_origins, since each copy is typed and lowered again.
 """
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import sys
 import threading
 from collections.abc import Callable
 from typing import Any, Generic, ParamSpec, TypeVar
@@ -143,8 +145,12 @@ def callback(function: Callable[..., object], *, returns: type[bool] | None = No
 
 
 def compile_alone() -> None:
-    """Say that nobody else uses numba in this process, so that it may be hurried (translate.py)."""
-    _ALONE.append(True)
+    """Say that nobody else uses numba in this process, so that it may be hurried (translate.py).
+
+    Where it has been imported already somebody does, and it stays as it is.
+    """
+    if "numba" not in sys.modules:
+        _ALONE.append(True)
 
 
 def _introduce() -> None:

@@ -28,12 +28,15 @@ __all__ = [
     "Body",
     "Functions",
     "HitFilter",
+    "Packets",
     "Tree",
     "build_tree",
     "functions",
     "packets",
     "version",
 ]
+
+Packets = tuple[int, int, int, int]  # see packets
 
 FORMAT_UINT3, FORMAT_FLOAT3, FORMAT_FLOAT3X4_COLUMN_MAJOR = 0x5003, 0x9003, 0x9234
 BUFFER_INDEX, BUFFER_VERTEX = 0, 1
@@ -186,7 +189,7 @@ def functions() -> Functions:
 
 
 @functools.cache
-def packets(*, coherent: bool = False, lanes: int | None = None) -> tuple[int, int, int, int]:
+def packets(*, coherent: bool = False, lanes: int | None = None) -> Packets:
     """How kernels ask for packets: rtcOccludedN and rtcIntersectN, N, and the address of their arguments.
 
     coherent : whether rays of a packet meet much the same boxes on their way, so that Embree follows them together

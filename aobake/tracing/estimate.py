@@ -22,6 +22,7 @@ from aobake.settings import TraceSettings
 from aobake.tracing import embree
 from aobake.tracing.blocks import over_blocks
 from aobake.tracing.contacts import note_triangle
+from aobake.tracing.embree import Packets
 from aobake.tracing.gathered import Gathered
 from aobake.tracing.kernels import LINEAR, SMOOTH, SUMS, trace
 from aobake.tracing.kernels import scratch as kernel_scratch
@@ -30,6 +31,7 @@ from aobake.tracing.neighbours import Neighbours
 from aobake.tracing.order import along, path
 from aobake.tracing.origins import ENCLOSED, OPEN, PLAIN, place_origins
 from aobake.tracing.origins import scratch as origins_scratch
+from aobake.tracing.planning_kernels import compile_planning
 from aobake.tracing.rounds import PILOT, STRIDE, missing
 from aobake.tracing.sampling import direction_sets
 from aobake.tracing.sized_sets import SizedSets
@@ -46,12 +48,6 @@ COUNTED = 2  # the column of the rays that count, of what trace adds up
 USUAL = 5  # rounds towards a tolerance
 ODD = 0x9E3779B97F4A7C15  # between the seeds of a point's sets
 SEEDS = 1 << 64
-# Rays of a point, squared, for each triangle, from which on neighbouring rays meet much the same boxes of the tree:
-# Embree then follows a packet together. Its rate over that of each ray by itself, scans, sixteen lanes: 4,000
-# triangles 1.09 at 256 rays (0.99 at 128), 16,000 1.23 at 512 (1.01 at 256), 70,000 1.20 at 1,024 (0.97 at
-# 256), 280,000 1.08 at 1,024 (0.85 at 256). The same rays are found occluded. Nearest hits differ in last
-# bits, and filters are asked about a hit more than once, so that only plain surfaces are traced so.
-COHERENT = 4
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -62,7 +58,7 @@ class Request:
     open : (P,) bool, points that everything lies below, which need no ray unless something touches them
         face to face; None: nothing is known of any
     sets : directions to trace instead of sampling.direction_sets(rays), as many and in the same form, but
-        2^k sets of any number: for comparing ways to choose them; None: those
+        2^k sets of any number: for comparing ways to choose them, without a tolerance; None: those
     reach : how far a ray counts at most in a mean distance, in scene units; None: nobody asks for one
     """
 
@@ -185,6 +181,11 @@ class Work:
         """Directions for so many rays of a point, rising."""
         return SizedSets.of({rays: self._sets(rays) for rays in sizes})
 
+    def packets(self, rays: float) -> Packets:
+        """How packets are asked for where points have so many rays in the mean."""
+        plain = self.settings.falloff == "none" and self.request.reach is None
+        return embree.packets(coherent=plain and self.world.keeps_together(rays))
+
     def _sets(self, rays: int) -> NDArray[np.float32]:
         if self.request.sets is not None:
             return self.request.sets
@@ -199,7 +200,9 @@ def compile_kernels(world: World, request: Request, settings: TraceSettings) -> 
     """
     none = np.zeros(0, np.int64)
     nothing = Work.planned(world, request.only(none), settings)
-    _trace(nothing, none, nothing.sets([1]), none)
+    _trace(nothing, nothing.packets(1), none, nothing.sets([1]), none)
+    if settings.tolerance is not None:
+        compile_planning()
     _place(nothing, none)
 
 
@@ -229,14 +232,14 @@ def _first_pass(work: Work, over_blocks: Callable[..., None], progress: Progress
     """Origins of all points, and their rays: all of them, or towards a tolerance a few of those that lead."""
     count, fixed = len(work.origins), work.settings.tolerance is None
     rays = work.settings.rays if fixed else PILOT
-    sets = work.sets([rays])
+    sets, packets = work.sets([rays]), work.packets(rays)
     first = np.ones(count, bool) if fixed else work.leading()
 
     def begin(block: IntArray) -> None:
         _place(work, block)
         chosen = block[first[block] & _wants_rays(work.states[block])]
         each = np.full(len(chosen), rays)
-        work.tally.add(chosen, _trace(work, chosen, sets, each), each)
+        work.tally.add(chosen, _trace(work, packets, chosen, sets, each), each)
 
     report = None
     if progress is not None:
@@ -276,13 +279,14 @@ def _next_sets(
     wanted[points] = sizes
     if len(going) == 0:
         return
-    sets = work.sets(np.unique(sizes[going]).tolist())
+    mean = int(sizes.sum()) / len(going)
+    sets, packets = work.sets(np.unique(sizes[going]).tolist()), work.packets(mean)
 
     def go_on(block: IntArray) -> None:
         each = wanted[block]
-        work.tally.add(block, _trace(work, block, sets, each, number), each)
+        work.tally.add(block, _trace(work, packets, block, sets, each, number), each)
 
-    over_blocks(go_on, points[going], max(1, round(int(sizes.sum()) / len(going))))
+    over_blocks(go_on, points[going], max(1, round(mean)))
 
 
 def _still(progress: Progress, settled: int, count: int, _: int) -> None:
@@ -323,11 +327,11 @@ def _wants_rays(states: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
 
 def _trace(
-    work: Work, chosen: IntArray, sets: SizedSets, rays: IntArray, number: int = 0
+    work: Work, packets: Packets, chosen: IntArray, sets: SizedSets, rays: IntArray, number: int = 0
 ) -> FloatArray:
     """(len(chosen), SUMS) what kernels.trace adds up over the rays from each of the chosen points.
 
-    rays : (len(chosen),) how many, each the size of some of the sets
+    packets : of embree.packets; rays : (len(chosen),) how many, each the size of some of the sets
     number : of the set, among those of a point
     """
     settings, request = work.settings, work.request
@@ -339,10 +343,8 @@ def _trace(
         geometric = request.geometric[chosen].astype(np.float32)
     falloff = {"none": None, "linear": LINEAR, "smooth": SMOOTH}[settings.falloff]
     far = np.inf if settings.max_distance is None else settings.max_distance * scale
-    plain = falloff is None and request.reach is None and not work.world.filtered
-    mean = rays.sum() / max(len(rays), 1)
     trace(
-        embree.packets(coherent=plain and bool(mean**2 >= COHERENT * work.world.triangles)),
+        packets,
         work.world.tree.address,
         at,
         request.normals[chosen].astype(np.float32),

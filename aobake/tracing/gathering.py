@@ -70,7 +70,7 @@ class _Gathered(codegen.JITCodeLibrary):
 
     def get_pointer_to_function(self, name: str) -> int:
         """0: kernels have no entry for Python. Raises RuntimeError where somebody else's function has one."""
-        if any(name in text for text in self.texts):
+        if not self.texts or any(name in text for text in self.texts):
             raise RuntimeError("numba serves kernels alone in this process, see compile_alone.")
         return 0
 

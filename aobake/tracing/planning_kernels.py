@@ -12,7 +12,7 @@ import numpy as np
 
 from aobake.tracing.compiled import inlined, kernel
 
-__all__ = ["common_worth", "rates", "set_sizes"]
+__all__ = ["common_worth", "compile_planning", "rates", "set_sizes"]
 
 HALVINGS = 16  # of 60 octaves: to a thousandth of one
 
@@ -49,7 +49,7 @@ def variance_at(scaled, rays, unseen):
 
 @kernel
 def common_worth(variance, scaled, shape, mean, law, low, high):
-    """What one more ray should take away at each point for the variance to be so large in the mean: log2 of it.
+    """What one more second should take away at each point for the variance to be so large in the mean: log2 of it.
 
     variance, scaled : (P,) float64, n^1.5 times it; mean : float64, what is asked for
     shape : (P,) float64, how many rays each point has for its lines where that is 1
@@ -93,3 +93,11 @@ def set_sizes(scaled, goal, sums, between, least, unseen, found):
                 place += step
             step >>= 1
         found[i] = max(place, least[i])
+
+
+def compile_planning() -> None:
+    """Compile these, or load them from disk, in the calling thread."""
+    none, whole = np.zeros(0), np.zeros(0, np.int64)
+    rates(np.zeros((1, 0), np.float32), none, none, 1.0, 1.0, none)
+    common_worth(none, none, none, 1.0, (1.0, 1.0, 1.0), 0.0, 1.0)
+    set_sizes(none, none, (none, none, whole), none, whole, 1.0, whole)

@@ -21,7 +21,7 @@ IntArray = NDArray[np.int64]
 
 
 class SizedSets(NamedTuple):
-    """Sets of S sizes, as kernels take them.
+    """Sets of S sizes, as kernels take them: a copy where there are several.
 
     directions : (packets, 3, 8) float32, of all sets, one after the other
     table : (S, 4) int64, of each size: its rays, packets of a set, where its first set begins, and how many there are

@@ -48,9 +48,9 @@ def hurry() -> None:
             importlib.import_module("numba.np.arraymath")
         finally:
             del sys.modules[blas]
-        from aobake.tracing.gathering import gather
+    from aobake.tracing.gathering import gather
 
-        gather()
+    gather()
 
 
 def introduce(function: Callable[..., object]) -> None:
