@@ -92,7 +92,7 @@ def compile_for_texels() -> None:
 
     compile_origins()
     bake_texture(
-        Scene(meshes=(_square(),), instances=(Instance(mesh=0),)), BakeSettings(size=16, rays=1)
+        Scene(meshes=(_square(),), instances=(Instance(mesh=0),)), BakeSettings(size=32, rays=1)
     )
 
 

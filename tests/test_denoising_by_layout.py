@@ -33,9 +33,18 @@ def squares(side: int) -> Layout:
     return Layout(pages=(page, page), placings=(None,))
 
 
-@pytest.mark.parametrize("side", [1, 3, 16])
+@pytest.mark.parametrize("side", [1, 3, 15])
 def test_the_mean_chart_is_its_share_of_the_page(side: int) -> None:
     assert texels_a_chart(squares(side), 256) == pytest.approx(256**2 / 4 / side**2)
+
+
+def test_specks_that_are_never_denoised_do_not_count() -> None:
+    """A chart of a quarter of a page, and 1,024 of 16 texels."""
+    large, specks = squares(1), squares(32)
+    both = Layout(pages=(*large.pages, *specks.pages), placings=(None,))
+    assert texels_a_chart(both, 256) == pytest.approx(256**2 / 4)
+    assert denoised_where_it_pays(ON, both, AUTO).effects["denoise"].on
+    assert texels_a_chart(specks, 256) == 0.0
 
 
 @pytest.mark.parametrize(("side", "on"), [(4, True), (6, True), (7, False), (16, False)])

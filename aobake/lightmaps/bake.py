@@ -68,8 +68,6 @@ def prepare_texture(
     seconds: dict[str, float] = {}
     with timed(seconds, "prepare"):
         plan = texture_plan(scene, settings)
-        if plan.effects["denoise"].on:
-            check_denoiser()
         surfaces = surfaces_of(scene, settings)
         found = tuple(finding for surface in surfaces for finding in surface.findings)
         if settings.strict:
@@ -81,6 +79,8 @@ def prepare_texture(
             unwrapping = None if progress is None else partial(progress, "unwrap")
             layout = lay_out(scene, prepared, settings, settings.threads, unwrapping)
     plan = denoised_where_it_pays(plan, layout, settings)
+    if plan.effects["denoise"].on:
+        check_denoiser()
     ground = lowest(scene, prepared, settings)
     with timed(seconds, "build"):
         samples = len(layout.pages) * (settings.size * settings.supersample) ** 2

@@ -55,7 +55,7 @@ def texture_cost(
     samples = texels * settings.supersample**2
     stages["texels"], stages["finish"] = SAMPLED_S * samples, FILLED_S * texels
     count = charts if meshes else KEPT_CHARTS * layout.pages
-    small = FILLED * texels < LEAST_CHART * count
+    small = bool(meshes) and FILLED * texels < LEAST_CHART * count
     if decided.effects["denoise"].on and not (settings.denoise == "auto" and small):
         stages["denoise"] = _denoising(FILLED * texels, count, settings.threads)
     return TextureCost(points=round(FILLED * samples), stages=stages)
