@@ -243,7 +243,7 @@ def draw(record: Mapping[str, object], folder: Path) -> None:
     import matplotlib.pyplot as plt
     from figures import STYLE
 
-    tables = [t for t in record["tables"] if t["title"].startswith("By ")]
+    tables = [t for t in record["tables"] if "fixed:" in t["facts"]]
     for column, name, label in ((1, "time", "seconds"), (2, "memory", "MB")):
         with plt.rc_context({**STYLE, "svg.hashsalt": "aobake"}):
             figure, axes = plt.subplots(2, 3, figsize=(9.0, 5.4), layout="constrained")
